@@ -161,7 +161,7 @@ def test_no_special_value_makes_it_walk(order, dt):
         pytest.param(
             cv.scenes.lagrange_top(), cv.Splitting(order=4), 0.002, "vertical momentum", 100_000, 4e-13, marks=pytest.mark.slow
         ),
-        (cv.scenes.symmetric_body(), cv.Lame(), 0.05, "momentum", 100_000, 1.1e-13),
+        pytest.param(cv.scenes.symmetric_body(), cv.Lame(), 0.05, "momentum", 100_000, 1.1e-13, marks=pytest.mark.slow),
     ],
     ids=["nutating_top", "lagrange_top", "symmetric_body"],
 )

@@ -38,7 +38,7 @@ def python(arguments: list[str], **environment: str) -> str:
 
 
 @pytest.mark.late
-@pytest.mark.parametrize("every", [10, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("every", [20, pytest.param(1, marks=pytest.mark.slow)])
 def test_plain_python_and_machine_code_agree_on_every_kernel(every: int, tmp_path: Path) -> None:
     plain, compiled = tmp_path / "plain.npz", tmp_path / "compiled.npz"
     not_called = python([str(SHORT_RUNS), str(plain), str(every)], NUMBA_DISABLE_JIT="1")
@@ -46,7 +46,7 @@ def test_plain_python_and_machine_code_agree_on_every_kernel(every: int, tmp_pat
     assert every > 1 or not_called == ""
     with np.load(plain) as ours, np.load(compiled) as theirs:
         assert set(ours) == set(theirs)
-        assert len(ours.files) > 100
+        assert len(ours.files) > 1000 // every
         for name in ours:
             if ", many, " in name and not ours[name].size:  # a step that raises in plain Python sends all to run one by one
                 continue
