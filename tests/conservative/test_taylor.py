@@ -289,7 +289,9 @@ SAMPLED = {field: scene(field) for field in FIELDS} | {
 }
 
 
-@pytest.mark.parametrize(("name", "every"), sampled(product(SAMPLED, (1, 7)), 4, [("satellite", 7), ("brick_flip", 1)]))
+@pytest.mark.parametrize(
+    ("name", "every"), sampled(product(SAMPLED, (1, 7)), 4, [("satellite", 7), ("brick_flip", 1), ("symmetric top", 7)])
+)
 def test_steps_span_samples_that_are_as_accurate_as_steps(name: str, every: int) -> None:
     """If every 7th is stored, the last interval is shorter. Samples do not change the steps."""
     held, method = SAMPLED[name], cv.Taylor(tolerance=1e-11)
