@@ -193,6 +193,7 @@ def test_an_old_name_answers_with_the_command_that_replaces_it(words, new):
 
 
 def test_a_folder_stands_for_its_recordings_and_not_for_other_archives(tmp_path):
-    for name in ("b.csv", "a.json", "c.csv.gz", "backup.tar.gz", "notes.md", "d.urdf"):
+    for name in ("b.csv", "a.json", "c.csv.gz", "backup.tar.gz", "notes.md", "d.urdf", "LOG.CSV"):
         (tmp_path / name).touch()
-    assert [subject.path.name for subject in expand([str(tmp_path)])] == ["a.json", "b.csv", "c.csv.gz", "d.urdf"]
+    found = [subject.path.name for subject in expand([str(tmp_path)])]
+    assert found == ["LOG.CSV", "a.json", "b.csv", "c.csv.gz", "d.urdf"]

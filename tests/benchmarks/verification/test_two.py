@@ -77,6 +77,14 @@ def test_a_difference_between_rows_is_seen():
     assert difference.allowed[0] < 1e-4  # measured: 3e-5, by the interpolation between rows
 
 
+def test_the_time_of_the_largest_difference_is_a_time_of_the_files():
+    wrong = W.copy()
+    wrong[60] += 0.1
+    for begin in (0.0, 1000.0):
+        difference = verify(of(R, W, T + begin), of(R, wrong, T + begin)).details.difference
+        assert difference.time == pytest.approx(begin + T[60])
+
+
 def test_two_wrong_ones_have_the_same_mistake_or_another_body(monkeypatch):
     found = verify(of(*without(FREE)), of(*without(FREE)))
     assert "same mistake" in found.reason
