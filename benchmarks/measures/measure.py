@@ -49,7 +49,6 @@ class Measure(Enum):
     """How often the body turned over (`count_turns_over`)."""
     TURNS_OVER_TRUE = "turns over of the exact motion", "1"
     PRECISION = "precision of numbers", "bit"
-    ERROR_OVER_TOLERANCE = "error over tolerance", "1"
 
     def __init__(self, text: str, unit: str) -> None:
         self.text, self.unit = text, unit
