@@ -34,6 +34,14 @@ def test_values_differ_if_their_ranges_do(was, now, options, expected):
     assert direction(was, now, **options) == expected
 
 
+@pytest.mark.parametrize(
+    ("signed", "size"),
+    [(Range(0.1, -1, 2), Range(0.1, 0, 2)), (Range(-2, -3, -1), Range(2, 1, 3)), (Range(2, 1, 3), Range(2, 1, 3))],
+)
+def test_the_size_of_a_range_around_0_begins_at_0(signed, size):
+    assert signed.size == size
+
+
 def test_no_other_rule_decides(monkeypatch):
     worse = comparison((row(), row(energy_drift_max=0.5), timed(SLOW, SLOW)))
     slow = tuple(2 * time for time in TIMES)

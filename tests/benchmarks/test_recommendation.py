@@ -98,6 +98,13 @@ def test_all_integrators_of_an_engine_are_listed(of_mujoco):
     assert euler.best.holds < 20
 
 
+def test_an_error_holds_until_its_law_reaches_it(of_mujoco):
+    longer = [advice.best for advice in of_mujoco.advice if advice.best and advice.best.length < advice.best.holds < np.inf]
+    assert longer
+    for best in longer:
+        assert best.error_law.extrapolate(best.holds) == pytest.approx(1e-6, rel=1e-6)
+
+
 def test_ours_is_cheaper_and_conserves_the_invariants(of_mujoco):
     ours = of_mujoco.advice[0]
     assert of_mujoco.winners["cheapest"] is ours

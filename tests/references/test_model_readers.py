@@ -488,6 +488,8 @@ def test_later_attributes_and_names_of_worlds_leave_a_file_open(read):
     (new,) = read("new.sdf", auto)  # by hand: 6 kg in a box, 6/12 (b^2 + c^2)
     np.testing.assert_allclose(new.truth.inertia, np.diag([0.125, 0.1, 0.065]), rtol=1e-12)
     assert not new.doubts
+    (heavy,) = read("heavy.sdf", sdf(f'<inertial auto="true"><density>500</density></inertial>{box}'))
+    assert heavy.truth.mass == pytest.approx(500 * 0.2 * 0.3 * 0.4)
     (old,) = read("old.sdf", auto.replace("1.11", "1.6"))
     assert "of SDF 1.11, and the file of SDF 1.6" in str(old.doubts)
     (world,) = read("world.urdf", urdf().replace('"a"', '"world"'))

@@ -5,6 +5,7 @@ import math
 import re
 import shutil
 import sys
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from conservative.attitude import angle_between
 from conservative.grid import grid_for
 from conservative.outcome import OutcomeKind
 from conservative.references.engine import principal_axes
+from conservative.references.environments import engine_method
 from conservative.references.environments.engine_method import WorkerRun
 from conservative.references.environments.plain_numbers import describe, describe_many, read_many, read_one
 from conservative.references.worker import program
@@ -60,6 +62,13 @@ def test_a_run_of_a_process_that_ended_is_not_forgotten_in_the_next(start):
     del old
     assert new().ok
     assert worker.ask("list")["runs"] == [1]
+
+
+def test_the_time_of_a_call_has_the_conversion_of_its_states(start, monkeypatch):
+    """The clock here goes on by 2 s at each look."""
+    run = run_of(start(sys.executable, "-I", PROGRAMS / "engine.py"), 0.1)
+    monkeypatch.setattr(engine_method, "perf_counter_ns", count(0, 2 * 10**9).__next__)
+    assert run.own_loop.wall_time(1) < 1 < 2 <= run.wall_time(1)
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -8,6 +8,7 @@ import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from conservative import deferred_imports
 from conservative.benchmarks.verification.bodies import loaded, verify_files
 from conservative.benchmarks.verification.bodies.explain import find_causes
 from conservative.benchmarks.verification.bodies.identify import accelerations, identify, make_cases
-from conservative.benchmarks.verification.bodies.loaded import CATALOGUE
+from conservative.benchmarks.verification.bodies.loaded import CATALOGUE, decide_refusal
 from conservative.benchmarks.verification.finding import EXIT_CODES, Verdict
 from conservative.benchmarks.verification.mistakes import BY_KEY
 from conservative.benchmarks.verification.mistakes.bodies import FITTED, LOADED
@@ -437,3 +438,11 @@ def test_every_rule_of_the_formats_has_a_model_and_every_model_a_rule():
     suffixes = {"URDF": ".urdf", "SDF": ".sdf", "MJCF": ".xml", "USD": ".usda"}
     assert all(model.endswith(suffixes[kind]) for kind, models in rules for model in models)
     assert all(Path(path).stat().st_size < 5000 for path in TRAPS)
+
+
+@pytest.mark.parametrize(("lonely", "verdict"), [("", Verdict.WRONG), ("one reader only", Verdict.UNDECIDED)])
+def test_nothing_is_said_against_a_refusal_of_what_only_one_reader_reads(lonely, verdict):
+    model = SimpleNamespace(
+        flaw="", invalid=[], bad=[], doubt=lambda engine: "", lonely=lonely, truth=SimpleNamespace(excess=0.0)
+    )
+    assert decide_refusal(model, "engine", "reason").verdict is verdict

@@ -236,6 +236,13 @@ def test_a_mistake_of_a_recording_is_named_on_all_rows_and_on_some(key, rows):
     )
 
 
+@pytest.mark.parametrize(("unit", "size"), [("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("min", 60.0)])
+def test_times_in_another_unit_are_times_in_seconds_of_its_size(unit, size):
+    mistake = BY_KEY[f"time in {unit}"]
+    assert mistake.unit == size
+    assert [t.tolist() for t in mistake.at(np.array([0.0, 2.0]), 0.1)] == [[0.0, 2 * size]] * 2
+
+
 @pytest.mark.parametrize("key", [each.key for each in READINGS])
 def test_what_a_reading_writes_it_reads_back(key):
     reading = BY_KEY[key]

@@ -370,6 +370,8 @@ def test_digits_of_answers():
     slow = find_digits(np.round(values, 8))
     assert slow.decimals == 8
     assert slow.resolution((np.eye(3), np.array([[1e-4, 0, 0]]))) == pytest.approx(1e-4)
+    fast = (np.eye(3), np.array([[10.0, 0, 0]]))  # attitudes have no more digits than with slow rates
+    assert Digits(decimals=8).resolution(fast) == pytest.approx(1e-8)
 
 
 SHOWS_WAYS = """
