@@ -212,7 +212,7 @@ def compare(case: Compared, recording: Recording, from_row: bool) -> Comparison:
     if not passed and not (whole and (parts[0].error[:, 0] <= case.allowed).all()):  # stretches and starts of right motions
         parts, errors = [replace(case, growth=parts[0].growth)], case.error
     worst, compared, outliers = errors, len(case.t), _outliers(errors, case, recording)
-    shape = _largest(recording.t, recording.shape)
+    shape = _largest(recording.t, recording.unit_errors)
     if (passed or outliers) and recording.rows > len(recording.t) and not undecided:
         worst, compared, bad, shape = _compare_all(parts, recording, -shift if from_row else 0.0)
         passed = passed and bad is None
@@ -341,7 +341,7 @@ def _outliers(errors: Array, case: Compared, recording: Recording) -> list[tuple
     return [(recording.number(k), float(case.t[k]), float(errors[:, k].max())) for k in off]
 
 
-def _largest(t: Array, shape: Array | None) -> tuple[float, float]:
+def _largest(t: Array, unit_errors: Array | None) -> tuple[float, float]:
     """Return the largest departure from a rotation, and its time, s."""
-    k = 0 if shape is None else int(np.argmax(np.abs(shape)))
-    return (0.0 if shape is None else float(np.abs(shape[k]))), float(t[k])
+    k = 0 if unit_errors is None else int(np.argmax(np.abs(unit_errors)))
+    return (0.0 if unit_errors is None else float(np.abs(unit_errors[k]))), float(t[k])
