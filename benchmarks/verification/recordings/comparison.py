@@ -30,7 +30,7 @@ from ..compare import (
     linearise,
     take_rows,
 )
-from ..solution import States, closed, truth
+from ..solution import States, has_closed_form, truth
 from .table import Recording
 
 MOST_NOISE = 0.05
@@ -158,7 +158,7 @@ def _find_noise(
     other: Any
     noise, resolved = estimate_noise(t, data)
     if (SIGMAS * noise / sizes > digits).any() and len(t) >= FEWEST_FOR_NOISE:
-        n = len(t) if closed(scene) else int(np.searchsorted(t + shift, start + NUMERICAL / scale))
+        n = len(t) if has_closed_form(scene) else int(np.searchsorted(t + shift, start + NUMERICAL / scale))
         (R, w), (a, b) = truth(scene, start, t[:n] + shift), take_rows(data, slice(0, n))
         rest: States = None if a is None else np.swapaxes(R, 1, 2) @ a, None if b is None else b - w
         if all(x is None or np.isfinite(x).all() for x in (*rest, R, w)):
@@ -199,10 +199,10 @@ def compare(case: Compared, recording: Recording, from_row: bool) -> Comparison:
     """Compare the rows that are kept for fits, and if they agree, all rows of the file."""
     undecided, shift = "", float(recording.t[0] - case.t[0])
     gap = float(np.median(np.diff(case.t))) * case.scale
-    if not closed(case.scene) and gap > NUMERICAL / 10:
+    if not has_closed_form(case.scene) and gap > NUMERICAL / 10:
         got = f"rows between which the body turns by {gap:.2g} rad"
         raise BadInput("run", recording.label(got), "closer rows, or the unit of the time in the header, such as time (ms)")
-    if not closed(case.scene) and len(near := case.first(NUMERICAL, 2).t) < len(case.t):
+    if not has_closed_form(case.scene) and len(near := case.first(NUMERICAL, 2).t) < len(case.t):
         case = case.take(slice(0, len(near)))
         undecided = f"Rows after {case.t[-1] + shift:g} s are not compared: no closed form is known. A shorter file decides"
     parts, missing, alone = _stretches(case, from_row)
@@ -308,7 +308,7 @@ def _compare_all(
                 row = int(np.flatnonzero(some)[off[0]])
                 bad = int(numbers[row]), float(t[row]), float(error[:, off[0]].max())
             worst = np.maximum(worst, error.max(axis=1, keepdims=True))
-            if not closed(part.scene):
+            if not has_closed_form(part.scene):
                 scene = part.scene.rename("file", R_WB0=R[-1], w_WB_B0=w[-1])
                 current[i] = replace(part, scene=scene, start=float(piece.t[-1]))
         count += len(t)
