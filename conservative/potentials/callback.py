@@ -12,6 +12,7 @@ import numpy as np
 from ..attitude import Array, cayley, from_quaternion
 
 _NEWTON_DIFFERENCE = 1e-7
+"""Difference of each component of the state, by which `_derivative` differentiates."""
 N_INPUTS, N_OUTPUTS = 27, 90
 """Numbers in a buffer: the inputs, which are the frame R_BP by rows and up to 18 of the state, and behind them the outputs."""
 

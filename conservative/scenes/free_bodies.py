@@ -21,7 +21,9 @@ from ..shapes import MassDistribution, box
 from .transforms import slow_motion, turned
 
 _BRICK = (13.0, 5.0, 10.0)
+"""Moments of the brick (Krenk & Nielsen, 5.1), kg m^2."""
 _PLATE = (0.9, 1.3)
+"""Moments of the plate in its plane, kg m^2; the third is their sum."""
 _SEPARATRIX = "separatrix of Euler's equations"
 _DEGENERATE = "Euler's equations, degenerate cases"
 
