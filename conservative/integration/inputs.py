@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from ..attitude import ROTATION_TOLERANCE, Array, orthonormality
 from ..batch import Batch
-from ..body import RigidBody, find_impossible
+from ..body import RigidBody, is_impossible
 from ..check import LARGEST, SMALLEST, describe, finite_array, read_only, real_array, require_size, rotation
 from ..errors import BadInput, ImpossibleInertia, nearest
 from ..potentials.turning import static_part
@@ -106,7 +106,7 @@ def _read_inertia(value: Array) -> Array:
     with warnings.catch_warnings(action="ignore", category=ImpossibleInertia):  # one warning for all is below
         _refuse_first("inertia", value, ~fine, RigidBody)  # its checks are exact, and accept most of them
     moments[~good] = np.linalg.eigvalsh(tensors[~good])  # accepted by `RigidBody`, such as molecules
-    impossible = find_impossible(moments)
+    impossible = is_impossible(moments)
     if impossible.any():
         warning = ImpossibleInertia(moments[impossible][0].tolist(), int(impossible.sum()))
         warnings.warn(warning, stacklevel=4)  # the caller of `integrate_many`

@@ -34,6 +34,7 @@ class Callback:
         inputs = bytes([what]) + buffer[:N_INPUTS].tobytes()
         last_inputs, outputs = getattr(self.last, "pair", (b"", buffer))
         if inputs != last_inputs:  # residual and tangent of one iteration need the same
+            # In the order of the kinds of `kernels.function_field`.
             functions = (_body_torque, _finite_torque, _finite_derivative, _energy, _torques, _damping, _wheel)
             with np.errstate(all="ignore"):  # trial runs take steps that are too long: what overflows makes such a step fail
                 outputs = functions[what](self.potential, buffer[:9].reshape(3, 3).copy(), buffer[9:N_INPUTS].copy())
