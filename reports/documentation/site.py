@@ -197,7 +197,7 @@ def as_restructured(app: Any, what: str, name: str, thing: Any, options: Any, li
 
 
 def show_block(translator: Any, node: Any) -> None:
-    """Write a formula as MathML, which browsers show without a script."""
+    """Write a formula, also an inline one, as a block of MathML, which browsers show without a script."""
     from docutils import nodes
     from docutils.utils.math.latex2mathml import tex2mathml
 

@@ -331,7 +331,10 @@ def _late(case: Compared) -> bool:
 
 
 def _outliers(errors: Array, case: Compared, recording: Recording) -> list[tuple[int, float, float]]:
-    """Return number, time and error of rows that are off while at least 98 of 100 others agree."""
+    """Return number, time and error of rows that are clearly off while all others, at least 98 of 100 rows, agree.
+
+    The first row has to agree, too.
+    """
     wrong = (errors > case.allowed[:, None]).any(axis=0)
     off, rest = np.flatnonzero(wrong), case.take(~wrong)
     if not 0 < len(off) <= 0.02 * len(case.t) or 0 in off or not rest.passes(errors[:, ~wrong]) or _late(rest):
