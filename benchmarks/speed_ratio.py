@@ -27,6 +27,7 @@ SMALLEST = 1e-17
 LINE = ("scene", "name", "family", "class")
 """Columns of points that identify a line of settings."""
 CONFIDENCE = 0.95
+"""Probability that the interval of a ratio contains the true ratio."""
 
 
 def credit(errors: Sequence[float]) -> list[float]:

@@ -28,7 +28,7 @@ def hat(v: ArrayLike) -> Array:
 
 
 def cayley(v: ArrayLike) -> Array:
-    """Return Cay(v) = (1 - hat(v)/2)^-1 (1 + hat(v)/2), (..., 3, 3), for rotation vectors v (..., 3)."""
+    """Return Cay(v) = (1 - hat(v)/2)^-1 (1 + hat(v)/2), (..., 3, 3), for v (..., 3): the rotation by 2 atan(|v|/2) about v."""
     half = np.asarray(v, dtype=float) / 2
     skew = hat(half)
     scale = 2 / (1 + np.sum(half * half, axis=-1))[..., None, None]

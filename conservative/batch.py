@@ -81,7 +81,7 @@ class Batch:
 
     @cached_property
     def varied(self) -> Varied | OneByOne:
-        """The fields of all bodies, where they have numbers of their own: those that turn as they are in their axes."""
+        """The fields of all bodies, with the parameters of each body. Fields that turn are in their own axes."""
         vary = getattr(static_part(self.scene.potential), "vary", None)
         if vary is not None:
             return vary(self.parameters)

@@ -22,7 +22,7 @@ _ROUND_OFF = 1e-6
 """Relative excess of a moment over the sum of the others that counts as rounding, as of a plate in a file with seven digits."""
 
 
-def find_impossible(moments: Array) -> Any:
+def is_impossible(moments: Array) -> Any:
     """Return whether no mass distribution has these moments (..., 3): one exceeds the sum of the others, beyond round-off."""
     return 2 * moments.max(axis=-1) > moments.sum(axis=-1) * (1 + _ROUND_OFF)
 
@@ -80,7 +80,7 @@ class RigidBody(PickledByFields):
         rotor = None if rotor_momentum is None else np.asarray(rotor_momentum, dtype=float)
         rotor = None if rotor is None or not rotor.any() else read_only(rotor)
         set_fields(self, inertia=read_inertia(inertia), rotor_momentum=rotor, motor=motor)
-        if find_impossible(self.moments):
+        if is_impossible(self.moments):
             warnings.warn(ImpossibleInertia(self.moments.tolist()), stacklevel=2)
 
     @property

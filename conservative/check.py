@@ -37,7 +37,7 @@ TENSOR_CONDITION = 1e13
 """Largest ratio of the principal moments of a tensor that is not diagonal.
 
 Round-off of the tensor changes its smallest moment by up to 4e-16 of the largest (measured on 10,000 random tensors). That is
-0.4 % at this ratio; at 1e15 even the sign of the smallest moment is unknown. A diagonal tensor has no such limit.
+0.4 % at this ratio; at 1e15 even the sign of the smallest moment is unknown. For a diagonal tensor it is `LARGEST`.
 """
 _INERTIA = "three positive moments (3,) or a symmetric positive definite matrix (3, 3), kg m^2"
 _RANGE = f"0 or of magnitude {SMALLEST:g} to {LARGEST:g}"
@@ -110,14 +110,19 @@ def read_inertia(value: ArrayLike) -> Array:
 
 
 def require_size(inertia: Array) -> None:
-    """Raise `BadInput` if an inertia (3, 3), kg m^2, is out of the range beside a field or a load, whose size matters, too."""
+    """Raise `BadInput` if an inertia (3, 3), kg m^2, is out of the range beside a field or a load.
+
+    There, not only ratios of moments matter.
+    """
     if not _in_range(float(np.abs(inertia).max())):
         allowed = (
             f"the largest component of magnitude {SMALLEST:g} to {LARGEST:g} beside a field or a load. Use larger or smaller"
         )
         got = describe((inertia if np.count_nonzero(inertia) > 3 else np.diag(inertia)).tolist())
         raise BadInput(
-            "inertia", got, f"{allowed} units for mass, length and time, or leave a free body alone: only ratios matter"
+            "inertia",
+            got,
+            f"{allowed} units for mass, length and time, or remove the field and the load: for a free body only ratios matter",
         )
 
 

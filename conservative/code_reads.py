@@ -22,9 +22,13 @@ LOCAL: Any = type("Local", (), {"__repr__": lambda self: "LOCAL"})()
 MISSING: Any = type("Missing", (), {"__repr__": lambda self: "MISSING"})()
 """A name without a value."""
 _SKIPPED = frozenset(["RESUME", "NOP", "PUSH_NULL", "EXTENDED_ARG", "PRECALL", "COPY_FREE_VARS", "MAKE_CELL", "NOT_TAKEN"])
+"""Instructions that neither read nor write a variable."""
 _WHILE_IMPORTING = frozenset(["POP_TOP", "SWAP"])
+"""Instructions between an import and the variables that it binds."""
 _ATTRIBUTES = frozenset(["LOAD_ATTR", "LOAD_METHOD"])
+"""Instructions that read an attribute."""
 _TWO = re.compile(r"((?:LOAD|STORE)_FAST(?:_BORROW)?)_((?:LOAD|STORE)_FAST(?:_BORROW)?)")
+"""The names of the two instructions in one."""
 
 
 class Read(NamedTuple):
@@ -93,6 +97,7 @@ def _list_imports(steps: list[tuple[str, Any]]) -> tuple[dict[str, Read], list[R
     for i, (kind, argument) in enumerate(steps):
         if kind == "IMPORT_NAME":
             (_, level), (_, names) = steps[i - 2 : i]
+            # `import a.b as c` has no names, and reaches b with IMPORT_FROM: `direct`. `import a.b` binds a.
             whole = argument if names or level else argument.partition(".")[0]
             current, item, direct = Read(whole, imported=True, level=level or 0), None, names is None
         elif current is None:

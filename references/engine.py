@@ -31,9 +31,11 @@ from .samples import MATRIX, States, to_body_axes
 STEP_LIMIT = 10_000_000
 """Largest number of steps of an adaptive engine: minutes of heyoka, an hour of SciPy."""
 PACE_STEPS = 1000
-"""Number of steps after which the time of the rest is estimated. A run that would take ten times `STEP_LIMIT` ends there."""
+"""Number of steps between estimates of all steps of a run, which ends at one that exceeds ten times `STEP_LIMIT`."""
 SHARE = 15 / 16
-"""Mass of a body about a fixed point, relative to the largest possible one: the mass of the paper's cone."""
+"""Mass of a body about a fixed point, relative to the largest possible one: the share of a cone on its tip,
+such as the cone of Krenk & Nielsen (`scenes.tops`), whose height is twice its radius.
+"""
 LONG = 1e5
 """Rotation in a run, rad, above which heyoka's pace is checked first. Shorter runs stay far below the limit."""
 
@@ -48,9 +50,9 @@ def limit_reason(steps: int, share: float) -> str:
 
 
 def pace_reason(scene: Scene, integrator: Any, t_end: float) -> str:
-    """Return why heyoka's integrator cannot reach t_end, s, from the initial state; "" if it may. The integrator moves."""
-    turns = t_end * math.sqrt(2 * scene.energy_scale / float(scene.body.moments.min()))
-    if turns < LONG:
+    """Return why heyoka's integrator cannot reach t_end, s, from the initial state; "" if it may. This steps the integrator."""
+    angle = t_end * math.sqrt(2 * scene.energy_scale / float(scene.body.moments.min()))
+    if angle < LONG:
         return ""
     for _ in range(PACE_STEPS):
         integrator.step()
@@ -101,7 +103,7 @@ class EngineAxes:
 
     @property
     def q0(self) -> Array:
-        """Initial attitude: unit quaternion (4,) of `R_WF`, scalar first."""
+        """Initial attitude: unit quaternion (4,) of `R_WF0`, scalar first."""
         return to_quaternion(self.R_WF0)
 
     @property
@@ -178,7 +180,8 @@ def symmetric_axes(scene: Scene) -> EngineAxes | None:
     axis = axial_direction(scene.body, scene.potential)
     if axis is None:
         return None
-    # heyoka's tolerance is relative to the state: with the axes of our kernels, its errors change by a few per cent.
+    # The first axis is perpendicular to the coordinate axis farthest from `axis`, not as in our kernels: heyoka's tolerance is
+    # relative to the state, and with the axes of our kernels its errors change by a few per cent.
     R_BF = axes_about(axis, beside=int(np.argmin(np.abs(axis))))
     return EngineAxes(scene, R_BF, np.diag(R_BF.T @ scene.body.inertia @ R_BF).copy())
 

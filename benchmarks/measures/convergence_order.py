@@ -16,6 +16,7 @@ from conservative.check import finite_array
 from conservative.errors import BadInput
 
 MIN_POINTS = 3
+"""Smallest number of points of a fit."""
 SHRINKING = 1 / 3
 """An error decreases with the step size if its local slope is above this fraction of the steepest slope."""
 ABOVE_FLOOR = 10.0

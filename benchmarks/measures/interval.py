@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from conservative.attitude import Array
 
 RESAMPLES = 4999
+"""Number of resamples of an interval."""
 
 
 def mean_of(values: Array) -> Array:

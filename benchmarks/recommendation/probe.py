@@ -43,9 +43,11 @@ SAMPLES = 32
 RUN_LIMIT, LONG_RUN_LIMIT = 0.1, 0.3
 """Wall time, s, of a short and of a long probe; with a short step it covers less of the motion."""
 LONG_SAMPLES = 256
+"""Largest number of samples of a probe."""
 FINER = 10
 """Spacings between two samples, if a window is long enough: round steps near that interval are multiples of the spacing."""
 LEAST_SAMPLES = 4
+"""Least number of samples of a window."""
 STEPS = 8
 """Least number of steps in a short window."""
 MUCH_LONGER = 4
@@ -55,6 +57,7 @@ DISTURBANCE = 1e-9
 AFFORDABLE = 0.3
 """Wall time, s, of each of the two disturbed runs if there is no closed form."""
 DENSE = 256
+"""Number of samples of a disturbed motion in closed form; a computed one has an eighth of them to twice as many."""
 MOST_GRIDS = 16
 """Number of grids whose exact attitudes are stored. Methods with the same samples share them."""
 

@@ -38,6 +38,7 @@ ERROR = 1e-6
 STEPS = (1, 2, 4, 8)
 """Steps per interval."""
 TOLERANCES = tuple(10.0**-k for k in range(4, 13))
+"""Tolerances of methods that have one."""
 
 
 def findings(study: Study, progress: Progress) -> Iterator[Measurement]:

@@ -46,6 +46,7 @@ def select_engines(names: Iterable[str], skip_missing: bool = False) -> tuple[Me
             methods.append(Missing(str(name), error=error))
     if not methods:
         raise BadInput("engines", repr(ALL), "engines that are installed: conservative engines install NAME")
+    # Of equal labels, the last position remains, with the first method.
     return tuple({method.label: method for method in reversed(methods)}.values())[::-1]
 
 

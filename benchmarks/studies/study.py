@@ -170,9 +170,10 @@ class Study:
         return 0.0 if math.isnan(cost) else cost  # the run itself tells how it fails
 
     def skip_slow(self, *ranks: Sequence[Case]) -> dict[Case, Outcome]:
-        """Return the cases on one scene that are not run, with the reason, so that all others take `SLOW_FACTOR` budgets.
+        """Return the cases on one scene that are not run, with the reason.
 
-        Cases of the first rank come before the others, and quick ones before slow ones. All that counts is measured before.
+        All others take at most `SLOW_FACTOR` budgets. Cases of the first rank come before the others, and quick ones
+        before slow ones. All that counts is measured before.
         """
         left, skipped = SLOW_FACTOR * self.longest_run, dict[Case, Outcome]()
         for rank in ranks:

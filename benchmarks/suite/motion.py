@@ -1,4 +1,4 @@
-"""The identity of a motion that outlives a program: what `Scene.key` is within one, in numbers.
+"""A key of a motion, made of numbers, that stays the same between programs; `Scene.key` is valid only within one.
 
 `Scene.key` is exact, and differs between interpreters and versions of this package. `Motion.key` does not: it is made of the
 numbers of `description.describe`, without the last digits, in which two machines differ. Both leave out the name of the scene.
@@ -21,7 +21,7 @@ from conservative.grid import count_steps
 from .description import describe_scene
 
 PROBES = tuple(rotation_about(axis, angle) for axis, angle in (((1, 2, 3), 0.4), ((-2, 1, 1), 1.3), ((1, -1, 4), 2.2)))
-"""Attitudes at which energies distinguish two potentials."""
+"""Arbitrary attitudes without symmetry, at which energies distinguish two potentials."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +48,7 @@ class Motion:
         return _hash([names, self._list_digits(count_steps(*self.description["ends"])), ""])
 
     def _list_digits(self, *n_steps: int) -> list[list[float]]:
+        """Return the digits of each group of numbers; `n_steps` is empty for `key`."""
         start = [self.description[name] for name in ("inertia", "R_WB0", "w_WB_B0")]
         parts = [part for part in self.description["parts"] if len(part)]
         groups = [*start, [*self.description["ends"], *n_steps], self.description["energies"], *parts]
@@ -66,6 +67,7 @@ def _digits(values: object) -> list[float]:
     """Return numbers without the last digits, in which two machines differ."""
     flat = np.ravel(np.asarray(values, dtype=float))
     scale = np.abs(flat).max(initial=0.0) or 1.0
+    # Rounded to 1e-10 of the largest; .9e removes the round-off of the product with it, and + 0.0 the sign of a zero.
     return [float(f"{value:.9e}") + 0.0 for value in np.round(flat / scale, 10) * float(f"{scale:.10e}")]
 
 

@@ -18,7 +18,7 @@ from conservative.attitude import Array, angle_between, to_quaternion
 from conservative.features import IN_TIME
 from conservative.scene import Scene
 
-from .solution import ANGLE, Equations, States, closed, truth
+from .solution import ANGLE, Equations, States, has_closed_form, truth
 
 FLOOR = 1e-9
 """Smallest allowed error: double precision makes smaller ones by round-off."""
@@ -448,7 +448,7 @@ def exact(case: Compared) -> Solution:
 
     def motion(R: Array, w: Array, _: Array, n: int) -> tuple[Array, Array]:
         t = case.t[:n]
-        if closed(case.scene) and ((t[-1] - case.start) * case.scale > 3 * LONGEST or case.growth > SENSITIVE):
+        if has_closed_form(case.scene) and ((t[-1] - case.start) * case.scale > 3 * LONGEST or case.growth > SENSITIVE):
             motions = [truth(case.scene.rename("file", R_WB0=a, w_WB_B0=b), case.start, t) for a, b in zip(R, w, strict=True)]
             return np.stack([a for a, _ in motions]), np.stack([b for _, b in motions])
         return case.equations().solve(case.start, R, w, t)

@@ -27,7 +27,7 @@ from .mistakes.scenes import PARTS as SCENE_PARTS
 from .mistakes.scenes import SCENES, SceneMistake, with_inertia
 from .mistakes.steps import INTEGRATORS
 from .mistakes.times import DROPPED, JITTERED, TIMES
-from .solution import Equations, closed, truth
+from .solution import Equations, has_closed_form, truth
 from .trials import by_habit, by_rule, compose, fits, remark_on_damping
 
 FEWEST, MOST = 100, 2500
@@ -248,7 +248,7 @@ def _within_digits(case: Compared, explanation: Explanation) -> Explanation:
 def _units(case: Compared, asked: _Asked) -> Explanations:
     """Yield times in other units than seconds."""
     for time in TIMES:
-        if not time.unit or case.turned * time.unit > 2 * LONGEST or case.scene.loads or not closed(case.scene):
+        if not time.unit or case.turned * time.unit > 2 * LONGEST or case.scene.loads or not has_closed_form(case.scene):
             continue
         if case.step is None:
             explanation = attempt(case, compose(time))
@@ -458,7 +458,7 @@ def _standstill(case: Compared, mistake: Standstill) -> Explanation | None:
             at = np.clip(p[:, :1] if p.shape[1] else of.start, of.start, None)
             t = np.minimum(of.t[:n], at) if p.shape[1] else np.full((len(R), n), of.start)
             flow = equations.flow(of.start, R, w, float(max(t.max(), of.start)) + 1e-9 * (of.t[-1] - of.start))
-            a, b = flow.shifted(t)
+            a, b = flow.at_own_times(t)
             return a, np.where((of.t[:n] >= stop)[:, None], mistake.rest, 1.0) * b
 
         return motion

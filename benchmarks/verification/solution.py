@@ -29,8 +29,11 @@ SMALLEST, TAIL = 1e-6, 3e-15
 _EPS = 2.0**-52
 
 _X = -np.cos(np.pi * np.arange(NODES) / (NODES - 1))
+"""Chebyshev points from -1 to 1."""
 _COEFFICIENTS = np.linalg.inv(chebyshev.chebvander(_X, NODES - 1))
+"""From values at the points to coefficients of their Chebyshev series."""
 _INTEGRAL = chebyshev.chebvander(_X, NODES) @ chebyshev.chebint(np.eye(NODES), lbnd=-1) @ _COEFFICIENTS
+"""From values at the points to their integrals from -1 to each point."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,7 +226,7 @@ class Flow:
         with np.errstate(all="ignore"):
             return self.equations.states(out, t)
 
-    def shifted(self, t: Array) -> tuple[Array, Array]:
+    def at_own_times(self, t: Array) -> tuple[Array, Array]:
         """Return the motion of each state, or of the only one, at its own times (B, n), s."""
         own = np.arange(len(t)) % self.first.shape[1]
         flows = [Flow(self.equations, self.ends, [x[:, [b]] for x in self.series], self.first[:, [b]]) for b in own.tolist()]
@@ -232,7 +235,10 @@ class Flow:
 
 
 def _sweep(slope: Callable[[Array], Array], y: Array, half: float, tolerance: float) -> tuple[Array, int]:
-    """Return the states (7, B, NODES) of a stretch from its first ones (7, B), and the number of iterations."""
+    """Return the states (7, B, NODES) of a stretch from its first ones (7, B), and the number of iterations.
+
+    The number is `SWEEPS` if they have not converged before.
+    """
     Y, last, size = np.repeat(y[:, :, None], NODES, axis=2), math.inf, np.abs(y).max() or 1.0
     for sweep in range(1, SWEEPS):
         new = y[:, :, None] + half * (slope(Y) @ _INTEGRAL.T)
@@ -293,7 +299,7 @@ def _each(value: Callable[..., Array], t: Array, R: Array, window: Window) -> Ar
     return np.array(flat).reshape(*t.shape, *np.shape(flat[0]))
 
 
-def closed(scene: Scene) -> bool:
+def has_closed_form(scene: Scene) -> bool:
     """Return whether the exact motion is known in closed form."""
     return Exact().unsupported(scene) is None and not scene.loaded and scene.body.rotor_momentum is None and (
         scene.potential is None or scene.symmetry_axis_B is not None
@@ -302,7 +308,7 @@ def closed(scene: Scene) -> bool:
 
 def truth(scene: Scene, start: float, t: Array) -> tuple[Array, Array]:
     """Return the exact motion (n, 3, 3), (n, 3) at times (n,), s, of a scene whose initial state is the state at `start`."""
-    if not closed(scene):
+    if not has_closed_form(scene):
         R, w = Equations(scene).solve(start, scene.R_WB0[None], scene.w_WB_B0[None], t)
         return R[0], w[0]
     if scene.potential is None:

@@ -151,7 +151,7 @@ def _at_times(
         times[:] = np.clip(times, 0.0 * t, np.maximum(t * FASTEST, end - case.start))
         if time.after and case.from_row:
             times[:, 0] = t[0]
-        out.append(flows[0].shifted(np.clip(times + case.start, case.start, end)))
+        out.append(flows[0].at_own_times(np.clip(times + case.start, case.start, end)))
     return out[0][0], out[1][1]
 
 

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from ..attitude import ROTATION_TOLERANCE, Array, orthonormality
 from ..batch import Batch
-from ..body import RigidBody, find_impossible
+from ..body import RigidBody, is_impossible
 from ..check import LARGEST, SMALLEST, describe, finite_array, read_only, real_array, require_size, rotation
 from ..errors import BadInput, ImpossibleInertia, nearest
 from ..potentials.turning import static_part
@@ -68,18 +68,18 @@ def _read(name: str, value: Any, shapes: tuple[tuple[int, ...], ...], given: Map
     """Return an argument as a new array (n, ...). n has to agree with earlier arguments."""
     array = real_array(value)
     other = next(iter(given), None)
-    n = "n" if other is None else str(len(given[other]))
-    allowed = "numbers of shape " + " or ".join(f"({n},{','.join(f' {size}' for size in shape)})" for shape in shapes)
-    allowed += "" if other is None else f": {n} bodies, as {other} has"
+    expected_n = "n" if other is None else str(len(given[other]))  # "n" before the first argument
+    allowed = "numbers of shape " + " or ".join(f"({expected_n},{','.join(f' {size}' for size in shape)})" for shape in shapes)
+    allowed += "" if other is None else f": {expected_n} bodies, as {other} has"
     if array is None:
         raise BadInput(name, describe(value), allowed)
-    if array.shape[1:] not in shapes or array.ndim == 0 or len(array) == 0 or n not in ("n", str(len(array))):
+    if array.shape[1:] not in shapes or array.ndim == 0 or len(array) == 0 or expected_n not in ("n", str(len(array))):
         raise BadInput(name, f"shape {array.shape}", allowed)
     return read_only(array)
 
 
 def _refuse_first(name: str, values: Array, bad: Any, check: Callable[[Any], object]) -> None:
-    """Raise the error of `check` for the first bad row of `values` (n, ...), with its number."""
+    """Raise the error of `check` for the first row of `values` (n, ...) marked `bad` that it rejects, with its number."""
     for i in np.flatnonzero(bad).tolist():
         try:
             check(values[i])
@@ -106,14 +106,15 @@ def _read_inertia(value: Array) -> Array:
     with warnings.catch_warnings(action="ignore", category=ImpossibleInertia):  # one warning for all is below
         _refuse_first("inertia", value, ~fine, RigidBody)  # its checks are exact, and accept most of them
     moments[~good] = np.linalg.eigvalsh(tensors[~good])  # accepted by `RigidBody`, such as molecules
-    impossible = find_impossible(moments)
+    impossible = is_impossible(moments)
     if impossible.any():
-        warnings.warn(ImpossibleInertia(moments[impossible][0].tolist(), int(impossible.sum())), stacklevel=4)
+        warning = ImpossibleInertia(moments[impossible][0].tolist(), int(impossible.sum()))
+        warnings.warn(warning, stacklevel=4)  # the caller of `integrate_many`
     return read_only((tensors + np.swapaxes(tensors, 1, 2)) / 2)
 
 
 def _read_parameters(scene: Scene, parameters: Any, given: dict[str, Array]) -> dict[str, Array]:
-    """Return checked parameters (n, ...) by name. If `given` is empty, one of them is added to it."""
+    """Return checked parameters (n, ...) by name. They are added to `given`, whose first array determines n."""
     if parameters is None:
         return {}
     if not isinstance(parameters, Mapping):
@@ -143,6 +144,7 @@ def _convert_parameters(scene: Scene, parameters: dict[str, Array]) -> dict[str,
     """Return parameters (n, ...) as the constructor of the potential converts them. Raise `BadInput` for the first bad one."""
     n = len(next(iter(parameters.values())))
     bodies = Batch(scene, np.broadcast_to(scene.R_WB0, (n, 3, 3)), np.broadcast_to(scene.w_WB_B0, (n, 3)), None, parameters)
+    # Bodies that the constructor may refuse or change (`potentials.varied`).
     suspects = getattr(static_part(scene.potential), "suspects", None)
     bad = np.ones(n, dtype=bool) if suspects is None else np.zeros(n, dtype=bool) | suspects(parameters)
     for values in parameters.values():

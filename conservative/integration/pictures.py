@@ -25,6 +25,7 @@ BLUE = "#0072B2"
 MOST_POINTS = 1000
 """Largest number of bodies that are drawn as points; more are drawn as counts in cells."""
 _CELLS, _SIDE = 41, 230
+"""Number of cells along a side of a disc, and length of the side in pixels."""
 _RINGS = (*(m * 10.0**k for k in range(-9, 1) for m in (1, 2, 5)), 10.0, 20.0, 30.0, 45.0, 60.0, 90.0)
 """Angles between rings, degrees."""
 _LEAST_EXTENT = 1e-7
@@ -32,6 +33,7 @@ _LEAST_EXTENT = 1e-7
 MOST_TIMES = 200
 """Largest number of samples of a line over time."""
 _PER_DECADE = 4
+"""Bars of a histogram in a decade."""
 _WIDTH, _HEIGHT = 560, 170
 _COLOURS = (BLUE, "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#56B4E9")
 """Okabe and Ito's colours, which colour-blind readers can distinguish."""

@@ -33,6 +33,7 @@ HARDEST, RANDOM, VERIFIED = 3, 5, 8
 SEED = 14
 """Seed of the random bodies, so that the same ensemble gets the same step."""
 ROUNDS = 3
+"""Largest number of choices of the step, each with the worst verified body of the one before."""
 LONGEST = 0.8
 """Step as a share of the longest possible one, for methods whose accuracy does not depend on the step."""
 

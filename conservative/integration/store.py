@@ -69,6 +69,7 @@ _ROOM = "a disk with enough space; finished blocks stay there, and resume=True c
 _WHOLE = "a complete one: integrate_many with the same arguments and resume=True computes the rest (--resume)"
 _RESULTS = ("R_WB", "w_WB_B", "drifts", "outcome", "failure")
 _CHECKSUM_BYTES = 4
+"""Length of the checksum at the end of a chunk."""
 _CHECKSUM, _CHECKSUMS = "checksum", "checksums"
 """Names of the attribute with the digest of the metadata, and of the array with the digests of the blocks."""
 _KINDS = tuple(str(kind) for kind in OutcomeKind)

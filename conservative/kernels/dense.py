@@ -101,8 +101,8 @@ def find_turn(spin, t, further):
 def march(model, frame, order, h, largest, n_steps, sampled, pause, lanes, R_WB, w_WB_B):
     """Fill R_WB (9 n,) and w_WB_B (3 n,) from the second sample on, n `REGISTER` more than the samples (`protocol`).
 
-    The order is even. The grid's times are h, s, apart. `largest` is from `find_share`, `lanes` are the numbers 0, 1, ... of
-    the lanes. A step that cannot be projected fails; the size is the relative defect that remains at its end.
+    The order is even. The grid's times are h, s, apart. `largest` is as `bind` passes it to `expand`, `lanes` are the numbers
+    0, 1, ... of the lanes. A step that cannot be projected fails; the size is the relative defect that remains at its end.
     """
     field, g, a = model.field, model.g, model.a
     body, K, w = begin(model)

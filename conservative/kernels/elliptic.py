@@ -35,6 +35,7 @@ COSINE = (
 )
 """Polynomials in x^2, |x| <= pi / 4, of the highest power first (fdlibm, Sun Microsystems 1993)."""
 LEVELS = 16
+"""Largest number of levels of the arithmetic-geometric mean."""
 TINIEST = 1e-60
 """Smaller values of mc count as 0: their effect is far below round-off."""
 

@@ -41,6 +41,7 @@ FAILURE = "the step is too long for the iteration"
 PAUSE = 2**18
 """Sweeps between two calls of handlers of signals."""
 MOST_SWEEPS = 120
+"""Largest number of sweeps of a step."""
 EARLY, SLOWEST = 4, 0.64
 """A step fails if, after the first few sweeps, two sweeps shrink the square of the change by less than this factor."""
 ENOUGH, STAGNATION = 1e-32, 4e-30

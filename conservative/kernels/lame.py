@@ -23,11 +23,15 @@ from .protocol import Result, Workspace, find_ends, loosen, record, record_lanes
 from .twofold import minus, over, plus, scale, times, two
 
 TERMS = 22
+"""Number of terms of `series`."""
 SERIES_RADIUS = 0.125
+"""Largest product of a time of `series` and the rate `scale_of`; constants of longer times come by doubling it."""
 DAMPING = 0.3
+"""Damping of a correction, relative to the square of the tilt."""
 NOWHERE = 1e-40
 """Square of a distance from the upright position that counts as none, rad^2."""
 LARGEST_POLE, LONGEST_FALL = 1.7, 1.0
+"""Largest p(h) h^2 of a part of a step, and largest product of its length and the rate of a fall (`split_step`)."""
 NEARLY_UPRIGHT = 0.01
 """Energy above the upright top's, relative to the potential one, below which a top passes by that position."""
 PAUSE = 2**18

@@ -45,6 +45,7 @@ FAILURE = "the step ends too far from the invariants to be projected onto them"
 PAUSE = 2**14
 """Steps between two calls of handlers of signals."""
 MOST_CORRECTIONS = 8
+"""Largest number of corrections of a projection."""
 ROUND_OFF = 2.0**-51
 """Largest relative defect that counts as none."""
 FAR, LEFT = 0.1, 1e-6

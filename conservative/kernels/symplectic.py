@@ -57,6 +57,7 @@ EXACT, AXES, ENDS, MIDDLE = range(4)
 PAUSE = 2**16
 """Stages between two calls of handlers of signals."""
 MOST_PARTS, MOST_CORRECTIONS = 1000.0, 50
+"""Largest number of parts of a free rotation, and of corrections of an implicit step."""
 ROUND_OFF, NEARLY, TINY = 1e-32, 1e-26, 1e-40
 """The solver stops at the first square of a relative correction, or where those below the second no longer shrink. The third is
 added to |c|^2 for a body at rest."""

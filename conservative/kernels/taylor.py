@@ -39,6 +39,7 @@ FAILURE = "the step ends too far from the invariants to be projected onto them"
 PAUSE = 2**16
 """Steps between two calls of handlers of signals."""
 MOST_CORRECTIONS = 8
+"""Largest number of corrections of a projection."""
 ENOUGH, NOISE = 2.0**-50, 2.0**-46
 """Relative defect after which a sample is not corrected further, and the largest defect that round-off alone can cause."""
 BETWEEN = 2.0**-24

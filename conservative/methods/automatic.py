@@ -40,6 +40,7 @@ from .search import (
 from .trials import ASYMPTOTIC, Estimate, parts_for, presumed_smooth, trials_of
 
 ATTEMPTS = 12
+"""Largest number of settings that are tried."""
 TOLERANCES, LEAST_TOLERANCE = 5, 1e-14
 """Largest number of tolerances of an adaptive method that are tried, and the smallest one."""
 MOST_STEPS = 10**10

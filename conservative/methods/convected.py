@@ -24,6 +24,7 @@ from .bounds import within_round_off
 from .units import in_own_units
 
 MAX_ITERATIONS = 20
+"""Largest number of Newton's corrections of a step."""
 Linearisation = Callable[[Array, Array], tuple[Array, Array]]
 
 

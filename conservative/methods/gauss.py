@@ -104,9 +104,9 @@ def convert(scene: Scene, method: Gauss) -> tuple[str, PrincipalStart, Any]:
     R_WP, L = from_quaternion(start.q), np.array(start.L)
     whole = L if start.rotor is None else L + start.rotor
     size = math.hypot(*whole)
-    # For a free body, the direction of the momentum replaces the vertical.
-    falls = start.field is not None or size == 0
-    R_WV = np.eye(3) if falls else axes_about(R_WP @ whole / size)
+    # The vertical is e_z. For a free body that moves, the direction of the momentum replaces it.
+    has_vertical = start.field is not None or size == 0
+    R_WV = np.eye(3) if has_vertical else axes_about(R_WP @ whole / size)
     moment = np.zeros(3) if start.field is None else np.array(start.field)
     # A power of two, so that scaling does not round. For a body at rest, the momentum that its field can produce.
     largest = max(size, math.hypot(*start.L), math.sqrt(max(start.J) * float(np.linalg.norm(moment))))
@@ -117,7 +117,7 @@ def convert(scene: Scene, method: Gauss) -> tuple[str, PrincipalStart, Any]:
         triple(moment / unit),
         (1.0, 1.0, 1.0 if start.spin is None else 0.0),  # the momentum about the axis of symmetry does not change
         triple(L / unit),
-        triple(R_WP[2] if falls else whole / size),
+        triple(R_WP[2] if has_vertical else whole / size),
         quadruple(R_WV.T @ R_WP),
         quadruple(R_WV),
         None if start.rotor is None else triple(np.array(start.rotor) / unit),

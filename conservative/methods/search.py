@@ -42,6 +42,7 @@ Tried = TypeVar("Tried")
 SAFETY = 0.5
 """Share of the requested error that steps have to reach."""
 ATTEMPTS = 24
+"""Largest number of trial runs of a method."""
 STALLED = 0.7
 """Shorter steps no longer help if two in a row leave more than this share of the error before them."""
 PROBE_RADIANS = 200.0

@@ -12,6 +12,7 @@ import numpy as np
 from ..attitude import Array, cayley, from_quaternion
 
 _NEWTON_DIFFERENCE = 1e-7
+"""Difference of each component of the state, by which `_derivative` differentiates."""
 N_INPUTS, N_OUTPUTS = 27, 90
 """Numbers in a buffer: the inputs, which are the frame R_BP by rows and up to 18 of the state, and behind them the outputs."""
 
@@ -33,6 +34,7 @@ class Callback:
         inputs = bytes([what]) + buffer[:N_INPUTS].tobytes()
         last_inputs, outputs = getattr(self.last, "pair", (b"", buffer))
         if inputs != last_inputs:  # residual and tangent of one iteration need the same
+            # In the order of the kinds of `kernels.function_field`.
             functions = (_body_torque, _finite_torque, _finite_derivative, _energy, _torques, _damping, _wheel)
             with np.errstate(all="ignore"):  # trial runs take steps that are too long: what overflows makes such a step fail
                 outputs = functions[what](self.potential, buffer[:9].reshape(3, 3).copy(), buffer[9:N_INPUTS].copy())

@@ -18,7 +18,8 @@ from .field import FieldPotential
 class GradientField(NamedTuple):
     """Rows of G = 3 rate^2 J, J, and the direction e of the centre, world axes (`conservative.potentials.field`).
 
-    V = u' G u / 2 with u = R' e is quadratic in the base vectors. V* is therefore the gradient at their mean, e (G ubar)'.
+    V = u' G u / 2 with u = R' e is quadratic in the base vectors. V* is therefore the gradient at their mean, e (G ubar)':
+    ubar is the mean of u at both ends of the step.
     """
 
     rows: Any
@@ -51,10 +52,10 @@ class GradientField(NamedTuple):
         return self.rows, tuple(scale(0.5 * x, self.e) for x in self.e)
 
     def find_constants(self, J_inverse: Any) -> Any:
-        """Return six rows, from which `series` forms u = G g in two arrangements, with component j divided by J_j.
+        """Return six rows, from which `series` forms h = G g in two arrangements, with component j divided by J_j.
 
         The arrangements of a vector v are v_r = (v2, v3, v1) and v_s = (v3, v1, v2). The first three rows times g_r, g_s and g,
-        component by component, add up to u_r, and the last three to u_s.
+        component by component, add up to h_r, and the last three to h_s.
         """
         x, y, z = self.rows
         of_r = (y[1], z[2], x[0]), (y[2], z[0], x[1]), (y[0], z[1], x[2])
@@ -63,19 +64,20 @@ class GradientField(NamedTuple):
 
     def slope(self, constants: Any, g: Any) -> Any:
         """Return V and dV/dg in J."""
-        u = apply(self.rows, g)
-        return 0.5 * dot(g, u), u
+        h = apply(self.rows, g)
+        return 0.5 * dot(g, h), h
 
     def series(self, constants: Any, g: Any, series: Any) -> Any:
-        """Return the recurrence of J^-1 (g x u)."""
+        """Return the recurrence of J^-1 (g x h), h = G g."""
         rows = [series.vector(*row) for row in constants]
         by_r, by_s, by_g = zip(rows[:3], rows[3:], strict=True)
-        turned = series.history(), series.history()  # J^-1 u_r and J^-1 u_s
+        turned = series.history(), series.history()  # J^-1 h_r and J^-1 h_s
 
         def accelerate(c: Any, n: Any) -> Any:
-            for k, u in enumerate(turned):
-                u.push(fuse(by_s[k], c[n, 1], fuse(by_r[k], c[n, 0], by_g[k] * c.newest[0])))
-            (r, s), (g_r, g_s) = turned, c.turned(0)  # g x u = g_r u_s - g_s u_r
+            # c[n, 0], c[n, 1] and newest[0]: coefficient n of g_r, g_s and g
+            for k, h in enumerate(turned):
+                h.push(fuse(by_s[k], c[n, 1], fuse(by_r[k], c[n, 0], by_g[k] * c.newest[0])))
+            (r, s), (g_r, g_s) = turned, c.turned(0)  # g x h = g_r h_s - g_s h_r
             return series.convolve(n, 0, n, ((s, g_r), (r, g_s)))[0]
 
         return accelerate
@@ -160,4 +162,4 @@ class GravityGradient(FieldPotential):
 
     def in_units(self, energy: float) -> GravityGradient:
         """Return the field with energies in units of `energy`, a power of two, J."""
-        return replace_unchecked(self, inertia=self.inertia / energy)
+        return replace_unchecked(self, inertia=self.inertia / energy)  # V is proportional to the inertia

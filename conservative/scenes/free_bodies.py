@@ -21,7 +21,9 @@ from ..shapes import MassDistribution, box
 from .transforms import slow_motion, turned
 
 _BRICK = (13.0, 5.0, 10.0)
+"""Moments of the brick (Krenk & Nielsen, 5.1), kg m^2."""
 _PLATE = (0.9, 1.3)
+"""Moments of the plate in its plane, kg m^2; the third is their sum."""
 _SEPARATRIX = "separatrix of Euler's equations"
 _DEGENERATE = "Euler's equations, degenerate cases"
 
@@ -43,6 +45,7 @@ def brick_flip(disturbance: float = 0.05, spin: float = 10.0, t_end: float = 6.0
     It is a box 1 x 3 x 2 of mass 12 with J = (13, 5, 10), which spins about the unstable intermediate axis, its third. The time
     between reversals grows like log(1/disturbance): 2.723 s for 0.05 rad/s.
     """
+    # The default has the plain name.
     name = "brick_flip" if disturbance == 0.05 else f"brick_flip_{_rate('disturbance', disturbance):g}"
     rates = (0.0, _rate("disturbance", disturbance), _rate("spin", spin))
     return _free_body(name, _BRICK, rates, t_end, 0.01, "Krenk & Nielsen, 5.1")

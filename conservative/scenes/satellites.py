@@ -32,7 +32,9 @@ PERIOD = 5400.0
 """Period of the orbit, s: about 280 km above the Earth."""
 RATE = 2 * math.pi / PERIOD
 DISTURBED_ABOUT = (0.6, 0.48, 0.64)
+"""Axis, in body axes, about which a disturbed satellite is turned from its equilibrium."""
 _NORMAL, _TO_PLANET = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
+"""Normal of the orbit, and direction to the planet at the start, world axes."""
 _SOURCE = "Hughes (1986), 9.2"
 
 

@@ -4,8 +4,8 @@ The loop is `mujoco.rollout` if samples are close, and `mj_step(m, d, nstep)` fr
 principal axes are MuJoCo's body axes. A free body has a free joint at its centre of mass, as in the models of MuJoCo's users.
 In free flight the joint is at the origin of the body frame. A body in a field has a ball joint at its fixed point. A spring is
 a spatial tendon between two sites. An attraction, a gravity gradient and fields that turn are a passive force: a C function
-that MuJoCo calls in each evaluation, `mjcb_passive`, made by numba. Switched off: every part of a step that such a body does
-not need.
+that MuJoCo calls in each evaluation, `mjcb_passive`, made by numba. Every part of a step that such a body does not need is
+switched off.
 
 Parameters
 ----------
@@ -33,6 +33,7 @@ import numpy as np
 from .shared import FIELDS, LATER, compile_torque, description_of, mujoco_moments, pack_field, write_mjcf
 
 INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast", "discrete")
+# Keys: see `EngineData` in environments/adapter.py.
 ENGINE = {
     "package": "mujoco",
     "module": "mujoco",
@@ -64,8 +65,11 @@ SWITCHED_OFF = (
 PASSIVE = ("SPRING", "PASSIVE")
 """Parts that are also switched off, unless there is a field."""
 FIELD = 20131013.0
-"""First number of the field in our models: the callback, which is the process's, leaves all other models alone."""
+"""An arbitrary number that nothing else contains. It marks our field in a model, so that the callback, which is the process's,
+leaves all other models alone, and it finds the time in memory.
+"""
 # Reading a sample out costs about as much as one Euler step; storing every step inside the engine's loop costs a tenth of one.
+# Largest number of steps per sample for a rollout.
 ROLLOUT_UP_TO = 8
 # Numbers that a rollout of many bodies stores at a time: 32 MiB.
 ROOM = 1 << 22
@@ -80,28 +84,28 @@ def prepare(given):
     start = _start(mj, model, data, given)
     march = _roll_out if given.every <= ROLLOUT_UP_TO else _step_to_samples
     evaluations = given.n_steps * (4 if given.integrator == "RK4" else 1)
-    field = _find_callback(mj, model, data)
+    callback = _find_callback(mj, model, data)
 
     def run():
-        with _quiet(mj, _ignore), _passive(mj, field) if field else nullcontext():
+        with _quiet(mj, _ignore), _passive(mj, callback) if callback else nullcontext():
             qpos, qvel, reason = march(mj, model, data, start, given)
         samples = {"q": qpos[:, -4:], "w": qvel[:, -3:], "reason": reason, "evaluations": evaluations}
         return samples | {"p": qpos[:, :3], "v": qvel[:, :3]} if hasattr(given, "p_WB0") else samples
 
     loop = _bind_loop(mj, model, data, start, given)
-    run.loop = _with_callback(mj, field, loop) if field else loop
+    run.loop = _with_callback(mj, callback, loop) if callback else loop
     return run
 
 
-def _with_callback(mj, field, loop):
+def _with_callback(mj, callback, loop):
     """Return the loop with its callback. `wall_time` installs it once, as users do."""
 
     def call():
-        with _passive(mj, field):
+        with _passive(mj, callback):
             return loop()
 
     def wall_time(calls):
-        with _passive(mj, field):
+        with _passive(mj, callback):
             began = perf_counter()
             for _ in range(calls):
                 loop()
@@ -139,11 +143,11 @@ def prepare_many(bodies):
     datas = [mj.MjData(models[0]) for _ in range(given.threads)]
     start = np.array([_start(mj, model, datas[0], body) for model, body in zip(models, bodies, strict=True)])
     room = np.empty((len(bodies), max(1, min(given.n_steps, ROOM // start.size)), start.shape[1]))
-    field = _find_callback(mj, models[0], datas[0])
+    callback = _find_callback(mj, models[0], datas[0])
 
     def run():
-        states, callback = [start], _passive(mj, field) if field else nullcontext()
-        with _quiet(mj, _ignore), callback, Rollout(nthread=given.threads if given.threads > 1 else 0) as pool:
+        states, installed = [start], _passive(mj, callback) if callback else nullcontext()
+        with _quiet(mj, _ignore), installed, Rollout(nthread=given.threads if given.threads > 1 else 0) as pool:
             for n_steps in np.diff(given.steps).tolist():
                 state = states[-1]
                 while n_steps:  # in parts, because a rollout stores every step
@@ -200,7 +204,9 @@ def _model(mj, given):
 WRITTEN = ("file", "child", "joints", "world", "damping")
 """Descriptions of a body by a file."""
 DUMMY = 1, (0.1, 0.2, 0.3), (2, 3, 4), (0.6, 0.8, 0, 0)
-"""A body whose centre and axes differ from its frame: MuJoCo decides that when it compiles a model."""
+"""A body whose centre and axes differ from its frame: MuJoCo decides when it compiles a model whether they
+coincide, so a body for which they did would keep the shortcut.
+"""
 
 
 def _inertial(given):
@@ -221,6 +227,7 @@ def _find_callback(mj, model, data):
 
 def _find_word(owner, value):
     """Return the place of an integer of 64 bits in one of MuJoCo's structures, whose layout changes with the version."""
+    # At most 1 MiB is searched.
     return next(word for word in range(1 << 17) if ctypes.c_int64.from_address(owner._address + 8 * word).value == value)
 
 

@@ -1,4 +1,4 @@
-"""The classes of engines: those that run in this process, and `exudyn`, in an environment, from `exudyn.py` in `engines`."""
+"""The classes of engines: those that run in this process, and, by name, those in an environment, such as `exudyn`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from types import ModuleType
 from typing import ClassVar
 
 from .. import engines
-from ..engines import mujoco as _mujoco  # the name without a dash at the front belongs to the class in an environment
+from ..engines import mujoco as _mujoco  # the name without an underscore belongs to the class in an environment
 from ..engines import pinocchio as _pinocchio
 from .adapter import SCRIPTS, LocalEngine, read_script
 from .engine_method import EngineMethod, engine_class
@@ -40,4 +40,5 @@ def __getattr__(name: str) -> type[EngineMethod]:
     file = next((candidate for candidate in files if candidate.is_file()), None)
     if file is None or name.startswith("_"):
         raise AttributeError(f"{__name__} has no class {name!r}, and there is no adapter of this name in references/engines")
+    # Adapters in other languages are read as text.
     return engine_class(read_script(file) if file.suffix in SCRIPTS else import_module(f"{engines.__name__}.{name}"))

@@ -150,7 +150,10 @@ def _install(engine: str, distribution: Distribution, lock: Lock, source: Source
 
 
 def make(engine: str, lock: Lock, folder: Path, source: Source, kind: EnvironmentKind = KINDS["python"]) -> Environment:
-    """Create an environment in place of an old one. Raise `BadInput` if a package is missing or the disk is full."""
+    """Create an environment, in place of an old one if there is one, and return it.
+
+    Raise `BadInput` if a package is missing or the disk is full.
+    """
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with temporary(folder, Path.mkdir) as scratch:

@@ -25,7 +25,7 @@ _SMALLEST_POLE_DISTANCE = 0.7
 """Smallest 1 + n_z for axis and angle. Closer to the pole their additional steps cost more than the products they save."""
 
 _DOWN = np.diag([1.0, -1.0, -1.0])
-"""Turns the world upside down, for tops that swing below the fixed point."""
+"""Half a turn about the first axis: of the world for tops that swing below the fixed point, of a free body's axes if L3 < 0."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +129,7 @@ def _free_rates_and_angle(scene: Scene) -> Formulation:
     slope = momentum / axes.J[2]
     numerator = (L0 @ axes.w0 - momentum * slope) / axes.J[2]
     form, parameters = forms.form_of(forms.free_rates_and_angle, [*_gyroscopic(axes), slope, numerator])
-    base = axes.R_WF0 @ _least(L0 / momentum)
+    base = axes.R_WF0 @ _smallest_rotation(L0 / momentum)
     return Formulation(axes, form, parameters, np.append(axes.w0, 0.0), RATES_AND_ANGLE, [slope, *axes.J.tolist()], base)
 
 
@@ -137,13 +137,14 @@ def _axis_and_angle(axes: EngineAxes, world: Array) -> Formulation:
     R0, (u0, constants) = world @ axes.R_WF0, _slow_frame(axes, world)
     n0, k = R0[:, 2], axes.moment[2] / axes.J[0] * world[2, 2]
     form, parameters = forms.form_of(forms.axis_and_angle, [k, u0[2], u0 @ n0 + u0[2]])
-    turned = _least(n0).T @ R0
+    turned = _smallest_rotation(n0).T @ R0
     p0 = float(np.arctan2(turned[1, 0], turned[0, 0]))
     start = np.array([*n0, *u0[:2], p0])
     return Formulation(axes, form, parameters, start, AXIS_AND_ANGLE, constants, world)
 
 
 def _gyroscopic(axes: EngineAxes) -> list[float]:
+    """Return the factors of w2 w3, w3 w1 and w1 w2 in Euler's equations."""
     J1, J2, J3 = axes.J.tolist()
     return [(J2 - J3) / J1, (J3 - J1) / J2, (J1 - J2) / J3]
 
@@ -175,7 +176,7 @@ def _heights(axes: EngineAxes) -> tuple[float, float]:
     return min((low for low, _ in reached), default=n), max((high for _, high in reached), default=n)
 
 
-def _least(n: Array) -> Array:
+def _smallest_rotation(n: Array) -> Array:
     """Return the smallest rotation (3, 3) from e_3 to a unit vector (3,) that is not -e_3."""
     x, y, z = n.tolist()
     a, b = x / (1 + z), y / (1 + z)

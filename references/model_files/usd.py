@@ -118,6 +118,7 @@ class Stage:
 
     def tensor(self, moments: Any, q: Any) -> Array:
         """Return an inertia (3, 3), kg m^2, from moments in units of the stage and the quaternion of their axes."""
+        # The default of USD, (0, 0, 0, 0), stands for no axes.
         axes = Rotation.from_quat([*q.GetImaginary(), q.GetReal()]).as_matrix() if q and q.GetLength() > 1e-6 else np.eye(3)
         return (axes * np.array(moments, float)) @ axes.T * self.kilogram * self.metre**2
 

@@ -38,6 +38,7 @@ LARGEST_ANSWER = 1 << 30
 LARGEST_FILE = 1 << 28
 """Largest file in bytes that a program with a memory limit may write, including its output."""
 _LONGEST_LINE = 300
+"""Most characters of a line of output in a message."""
 _ERRORS = ("Fatal Python error", "Current thread", "FATAL ERROR")
 """Beginnings of the lines above a stack, of Python and of Node."""
 _PATIENCE = 2.0
@@ -45,6 +46,7 @@ _PATIENCE = 2.0
 _LONGEST_WAIT = 1e6
 """Longest time of a timer, s."""
 _LARGEST = 1.7976931348623157e308
+"""Largest float: larger integers are refused."""
 _CAN_WAIT = hasattr(select, "poll")
 """True if waiting can have a limit. On Windows a thread ends a late process, which also ends the wait."""
 _READ, _WRITE, _PART = (select.POLLIN, select.POLLOUT, select.PIPE_BUF) if _CAN_WAIT else (0, 0, 1 << 16)

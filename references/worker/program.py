@@ -34,8 +34,11 @@ if TYPE_CHECKING:  # importing typing costs time at every start
     Message = dict[str, Any]
 
 PROTOCOL = 1
+"""Version of the protocol."""
 MAGIC = b"cv01"
+"""First bytes of a message in binary framing."""
 PREFIX = struct.Struct("<4sIQ")
+"""`MAGIC`, and the lengths of the JSON and of the arrays in bytes."""
 NOT_FINITE = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
 """JSON has no such numbers, so they travel as text."""
 WARM_UP = 0.02
@@ -56,6 +59,7 @@ def to_json(value: Any) -> bytes:
 
 
 def _name_numbers(value: Any) -> Any:
+    """Return a value with lists for NumPy arrays, and text for floats that are not finite."""
     if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, dict):
@@ -75,6 +79,7 @@ def from_json(data: bytes) -> Message:
 
 
 def _restore_numbers(value: Any) -> Any:
+    """Return a value with floats for the texts of `NOT_FINITE`."""
     if isinstance(value, dict):
         return {name: _restore_numbers(item) for name, item in value.items()}
     if isinstance(value, list):

@@ -101,7 +101,7 @@ class Solid:
             faces.append(Face(np.stack([base, before, after]), FACES[4 + quarter % 2], ((1, 2),)))
         return faces
 
-    def leave(self, direction: Array) -> float:
+    def share_inside(self, direction: Array) -> float:
         """Return the share of a vector (3,) from the fixed point that is inside the solid."""
         with np.errstate(divide="ignore"):
             if self.shape is Shape.BOX:
@@ -172,7 +172,7 @@ class Panel:
 
 def speeds(duration: float) -> list[float]:
     """Return five speeds, simulated s per s; with the middle one, the default, a motion takes about 10 s."""
-    middle = round(3 * math.log10(duration / 10))
+    middle = round(3 * math.log10(duration / 10))  # the speeds are 1, 2 and 5 in each decade
     return [float(f"{(1, 2, 5)[k % 3]}e{k // 3}") for k in range(middle - 2, middle + 3)]
 
 
@@ -232,7 +232,7 @@ def _panel(trajectory: Trajectory, label: str, times: Array, values: Values) -> 
     from scipy.spatial.transform import Rotation
 
     t, scene, body = trajectory.t, trajectory.scene, trajectory.scene.body
-    near = 1e-9 * times[-1]
+    near = 1e-9 * times[-1]  # times that differ by less are equal
     times = times[: 1 + np.count_nonzero(times < t[-1] - near)]  # the last frame is the last sample
     before = np.clip(np.searchsorted(t, times + near) - 1, 0, None)
     after = np.minimum(before + 1, len(t) - 1)
@@ -251,6 +251,7 @@ def _panel(trajectory: Trajectory, label: str, times: Array, values: Values) -> 
         label,
         "" if trajectory.ok else str(trajectory.outcome),
         solid,
+        # A quarter longer than the distance of the solid's farthest point, 1.
         1.25 * tip / np.linalg.norm(tip),
         R_WB @ body.R_BP,
         np.clip(L_W, -MOST, MOST),
@@ -266,7 +267,7 @@ def _solid_of(moments: Array, com_P: Array) -> Solid:
     along, off = int(np.argmax(np.abs(com_P))), np.sort(np.abs(com_P))[:2]
     about, (first, second) = moments[along], np.delete(moments, along)
     is_top = com_P.any() and off.max() <= SAME * np.abs(com_P).max() and abs(first - second) <= SAME * first
-    if is_top and about < 2 * first:
+    if is_top and about < 2 * first:  # otherwise no height has these moments
         sides = np.sqrt([2 * about, first - about / 2])  # r and h, times a constant
         size = np.maximum(sides, THINNEST * sides.max())
         return Solid(Shape.CONE, size / np.linalg.norm(size), np.sign(com_P[along]) * np.eye(3)[along])

@@ -190,7 +190,7 @@ def _draw_panel(sheet: _Sheet, corner: tuple[int, int], panel: Panel, frame: int
     arrow = arrow * min(1.0, 1.45 * LONGEST_ARROW / max(float(np.linalg.norm(arrow)), 1e-300))
     trace, middle = panel.R_WP[: frame + 1] @ panel.tip, float(EYE @ (R @ solid.centre))
     # Strokes nearer to the eye than the middle of the body are drawn after it. Rod and arrow begin where they leave it.
-    rods = [np.stack([solid.leave(end @ R) * end, end]) for end in (trace[-1], arrow)]
+    rods = [np.stack([solid.share_inside(end @ R) * end, end]) for end in (trace[-1], arrow)]
     strokes: list[tuple[Array, str, float, Callable[[Array], None] | None]]
     strokes = [*((np.stack(pair), TRACE, 1.0, None) for pair in pairwise(trace)), (rods[0], TRACE, 2.0, sheet.ball)]
     strokes.append((rods[1], ARROW, 2.4, sheet.head))

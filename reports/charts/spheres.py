@@ -24,9 +24,10 @@ _CIRCLES = [np.roll(_CIRCLE[::4], shift, axis=1) for shift in range(3)]
 
 
 def polhode(scene: Scene) -> Array | None:
-    """Return the polhode of a free body, closed (n, 3), in principal axes and the momentum's length; None for another scene.
+    """Return the polhode of a free body, closed (n, 3), in principal axes, in units of the momentum's length.
 
-    The sphere of the momentum meets the ellipsoid of the energy there. Seen along the axis that it surrounds, it is an ellipse.
+    The sphere of the momentum meets the ellipsoid of the energy there. Seen along the axis that the polhode surrounds, the
+    polhode is an ellipse. None for another scene than a free body without a rotor.
     """
     if not scene.free or scene.body.rotor_momentum is not None:
         return None
@@ -47,8 +48,8 @@ def polhode(scene: Scene) -> Array | None:
 def chart(curve: pd.DataFrame, exact: Array | None = None) -> Spec:
     """Return one sphere, from one curve of `lines.curves`, as a Vega-Lite specification; its far side is faint.
 
-    The samples are dots, as a line between them would cut corners: a turn of the brick has only a few samples. The exact curve
-    (n, 3) below them, such as a polhode, is a line.
+    The samples are dots, as a line between them would cut corners: a turn of the scene `brick_flip` has only a few samples. The
+    exact curve (n, 3) below them, such as a polhode, is a line.
     """
     name, family = curve[["name", "family"]].iloc[0]
     colour = colours({name: family})[name]
@@ -83,7 +84,10 @@ def _project(points: Array) -> Array:
 
 
 def _dots(across: Array, up: Array, colour: str, opacity: float) -> Spec:
-    """Return points as dots of one line: it breaks before each of them, and its caps are round."""
+    """Return points as dots of one line: it breaks before each of them, and its caps are round.
+
+    One line is smaller in an SVG file than a mark per point.
+    """
     points = [{"across": x, "up": y} for x, y in zip(across.tolist(), up.tolist(), strict=True)]
     breaks = [{"calculate": "[null, datum.across]", "as": "across"}, {"flatten": ["across"]}]
     return {
@@ -108,7 +112,7 @@ def _split(curve: Array) -> list[tuple[Array, bool]]:
 
 def _lines(curves: Sequence[Array], colour: str, width: float, opacity: float) -> Spec:
     rows = [
-        {"part": f"p{number}", "k": k, "across": x, "up": y}
+        {"part": f"p{number}", "k": k, "across": x, "up": y}  # no encoding uses k
         for number, curve in enumerate(curves)
         for k, (x, y, _) in enumerate(_project(curve).T.tolist())
     ]

@@ -48,7 +48,7 @@ SHOWN: dict[str, Shown] = {
         ("name", "N", "method"),
         ("setting", "N", "setting"),
         ("within", "N", "bodies"),
-        ("kind", "N", "taken"),
+        ("kind", "N", "taken"),  # of an engine: as installed, or at its best (`sections.engines`)
         ("size", "Q", "number of bodies"),
         ("time", "Q", "µs a body and simulated second"),
     )

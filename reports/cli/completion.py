@@ -59,6 +59,7 @@ def spreads(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> 
     before, last = _last(incomplete)
     names = list(SPREADS)
     with suppress(Exception):  # the scene is invalid, and an error cannot be shown during completion
+        # Click does not parse a line that ends in an option without its value; the arguments before it are then in ctx.args.
         scene = registry.scene(ctx.params.get("scene") or "".join(ctx.args[:1]))
         names += [f"potential.{name}" for name in list_parameters(scene)]
     return [CompletionItem(f"{before}{name}=") for name in names if name.startswith(last)]

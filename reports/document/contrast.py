@@ -32,6 +32,7 @@ def contrast(first: str, second: str) -> float:
 
 
 def _readable(colour: str, paper: str) -> str:
+    # White and black have the same contrast to a luminance of 0.18.
     towards = 255.0 if _luminance(paper) < 0.18 else 0.0
     for share in (k / 50 for k in range(51)):
         mixed = "#" + "".join(f"{round(channel + (towards - channel) * share):02X}" for channel in _channels(colour))

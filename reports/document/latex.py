@@ -15,7 +15,7 @@ LATEX_MARK = "% Written by conservative. It needs \\usepackage{booktabs,longtabl
 """The first line of a file with a table."""
 LONGEST = 40
 """Largest number of rows of a table on one page."""
-_SIGNS = str.maketrans(
+_SIGNS = str.maketrans(  # signs of our tables in LaTeX
     {
         "✓": r"$\checkmark$",
         "✗": r"$\times$",
@@ -49,8 +49,9 @@ def table(content: Table) -> str:
 
 
 def _typeset(text: object) -> str:
-    """Return a text whose characters have no meaning in LaTeX."""
+    """Return a text as LaTeX prints it: special characters escaped, and powers of ten and signs in its own form."""
     escaped = re.sub(r"[&%$#_{}]", r"\\\g<0>", re.sub(r"\\", r"\\textbackslash ", str(text)))
     escaped = escaped.replace("~", r"\textasciitilde{}").replace("^", r"\textasciicircum{}")
     powers = re.sub(r"(?<![\w.])(\d+(?:\.\d+)?)e(-?\d{1,3})\b", r"$\1\\times10^{\2}$", escaped)
+    # 1e-3 is 10^-3.
     return powers.replace(r"$1\times10", "$10").translate(_SIGNS)

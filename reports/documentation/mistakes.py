@@ -244,7 +244,7 @@ def is_of_loaders(key: str) -> bool:
 
 
 def in_recording(key: str, attitudes: bool = True) -> str:
-    """Return whether the verification of a recording with rates names a planted mistake."""
+    """Return in words how the verification of a recording with rates names a planted mistake, or why it does not."""
     if is_of_loaders(key):
         return OF_LOADERS
     if (example := planted(key)) is None:
@@ -279,7 +279,7 @@ def not_of_programs(mistake: Mistake) -> str:
 
 
 def in_program(key: str) -> str:
-    """Return whether the verification of a program names a mistake that is planted in up to `MOTIONS` exact motions."""
+    """Return in words how the verification of a program names a mistake, planted in up to `MOTIONS` exact motions."""
     mistake = BY_KEY[key]
     if reason := not_of_programs(mistake):
         return reason
@@ -303,7 +303,7 @@ def in_program(key: str) -> str:
 
 
 def in_test_files(key: str) -> str:
-    """Return whether the test files of references/motions have the signature of a mistake."""
+    """Return in words whether the test files of references/motions have the signature of a mistake."""
     if reason := not_of_programs(BY_KEY[key]):
         return reason
     return NAMED if key in _caught() else NOT_NAMED

@@ -39,6 +39,7 @@ DIVIDED = (
     "conservative/extending.md",
     "conservative/reference.md",
 )
+"""Pages that become one page per section of the second level."""
 SETTINGS = {
     "project": "conservative",
     "version": VERSION,
@@ -111,7 +112,7 @@ def sections(path: str) -> dict[str, str]:
     return pages
 
 
-def linked(name: str, path: str, text: str, pages: dict[str, dict[str, str]], source: Path) -> str:
+def redirect_links(name: str, path: str, text: str, pages: dict[str, dict[str, str]], source: Path) -> str:
     """Return a page whose links lead to pages of the site and to copies of files; links to folders become text."""
 
     def target(match: re.Match[str]) -> str:
@@ -135,7 +136,7 @@ def linked(name: str, path: str, text: str, pages: dict[str, dict[str, str]], so
     return CODE_OR_LINK.sub(target, text)
 
 
-def written(source: Path) -> None:
+def write_pages(source: Path) -> None:
     """Write the pages of the site into a folder."""
     from conservative.reports.cli.main import main
 
@@ -152,7 +153,7 @@ def written(source: Path) -> None:
     for path, parts in pages.items():
         suffix = posixpath.splitext(path)[1]
         for name, text in parts.items():
-            texts[name + suffix] = text if suffix == ".ipynb" else linked(name, path, text, pages, source)
+            texts[name + suffix] = text if suffix == ".ipynb" else redirect_links(name, path, text, pages, source)
     for name, sliders in LIVE.items():
         live = f"```{{raw}} html\n:file: {posixpath.basename(name)}.html\n```"
         texts[f"{name}.md"] = re.sub(r"^!\[.*?\)$", live, texts[f"{name}.md"], count=1, flags=re.MULTILINE)
@@ -160,6 +161,7 @@ def written(source: Path) -> None:
     groups = re.findall(r"^# (.*)\n\n((?:.+\n)+)", (ROOT / CONTENTS).read_text(encoding="utf-8"), re.M)
     for title, entries in groups:
         texts[f"contents/{anchor(title)}.md"] = listing(title, "", entries.split())
+    # [1:]: without the index itself
     texts["index.md"] += listing("", "", [*LIVE, *(f"contents/{anchor(title)}" for title, _ in groups)][1:], ":hidden:")
     public = [name for name in cv.__all__ if name not in ("scenes", "shapes", "verification", "VERSION")]
     texts |= {f"api/{name}.rst": api(f"conservative.{name}", name) for name in public}
@@ -195,7 +197,7 @@ def as_restructured(app: Any, what: str, name: str, thing: Any, options: Any, li
 
 
 def show_block(translator: Any, node: Any) -> None:
-    """Write a formula as MathML, which browsers show without a script."""
+    """Write a formula, also an inline one, as a block of MathML, which browsers show without a script."""
     from docutils import nodes
     from docutils.utils.math.latex2mathml import tex2mathml
 
@@ -282,9 +284,9 @@ def main() -> None:
 
     with tempfile.TemporaryDirectory() as place:
         source, built = Path(place) / "source", Path(place) / "site"
-        written(source)
+        write_pages(source)
         if report:
-            with (source / "results.md").open("a", encoding="utf-8") as page:
+            with (source / "results.md").open("a", encoding="utf-8") as page:  # the section Results of README.md
                 page.write('\n## Report of this version\n\n<a href="report/index.html">All methods, tables and charts</a>\n')
                 for engine in sorted(report.glob("engine_*.html")):
                     page.write(f'\n* <a href="report/{engine.name}">{engine.stem.removeprefix("engine_")}</a>\n')

@@ -44,9 +44,9 @@ def points(
     Returns
     -------
     pd.DataFrame
-        Columns scene, series, name (of its line), method, family, version, setting (of the line), role, class (see `classes`),
-        dt, error (rad), time (s per simulated second) and times (of each process); each line coarse to fine. An error
-        below the resolution of the reference solution is raised to it.
+        Columns scene, series, name (of its line), method, family, version, setting (of the line), role, class (see
+        `names.MethodClass`), dt, error (rad), time (s per simulated second) and times (of each process); each line coarse to
+        fine. An error below the resolution of the reference solution is raised to it.
     """
     rows = with_outcome(of_study(table, study), OutcomeKind.OK)
     rows = rows[rows["role"] != Role.TRUTH.value]
@@ -58,7 +58,8 @@ def points(
     wide["error"] = wide["error"].clip(lower=wide["scene"].map(resolution).fillna(0.0))
     wide = wide.dropna(subset=["error"] if untimed else ["error", "time"]).reset_index(drop=True)
     kinds = [class_of(role, method).value for role, method in zip(wide["role"], wide["method"], strict=True)]
-    # Under the name and the setting of its line; a line of several methods differs in tolerance.
+    # A method alone on its line keeps its own name and setting. Methods that differ only in tolerance have the name and the
+    # setting of their line.
     alone = wide.groupby("series")["method"].transform("nunique") == 1
     name, setting = wide["name"].where(alone, wide["line"]), wide["setting"].where(alone, wide["series_setting"])
     wide = wide.assign(name=name, setting=setting, **{"class": pd.Series(kinds, index=wide.index, dtype="string")})
@@ -67,6 +68,7 @@ def points(
 
 def pooled(timed: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
     """Return rows of times with a row for each value of `keys`: `time`, the geometric mean, and `times`, of each process."""
+    # Times from a single process have no number.
     wide = timed.assign(process=timed["process"].fillna(0)).pivot_table(index=keys, columns="process", values="value")
     times = pd.Series([tuple(row) for row in wide.to_numpy()], dtype=object)
     return wide.index.to_frame(index=False).assign(time=np.exp(np.log(wide).mean(axis=1)).to_numpy(), times=times)
@@ -117,7 +119,10 @@ def names_in_turn(picture: pd.DataFrame) -> tuple[str, ...]:
 
 
 def _rank(line: pd.DataFrame) -> tuple[int, float]:
-    """Return the smallest decade of error that a line reaches, and its median time."""
+    """Return the smallest error that a line reaches, in groups of three decades, and its median time.
+
+    Within a group, the faster line ranks first.
+    """
     return -int(-math.log10(max(float(line["error"].min()), 1e-16)) // 3), float(line["time"].median())
 
 
@@ -125,7 +130,7 @@ def under(lines: Iterable[tuple[str, pd.DataFrame]], x: str, y: str) -> Iterator
     """Yield a sentence for each line under which others lie exactly; lines have columns x and y, numbers above 0."""
     left = dict(lines)
     while left:
-        name, line = left.popitem()
+        name, line = left.popitem()  # the last line is drawn on top
         hidden = [
             other
             for other, points in left.items()

@@ -33,11 +33,14 @@ _BEGINNING = '{"format": '
 _MOST_DIFFERENCES = 3
 """Largest number of differences in a message."""
 _PACKAGES = (".", "references", "benchmarks")
-"""Packages whose source determines measurements. `reports` only shows them."""
+"""Packages whose source determines measurements. `reports` only shows them.
+
+`.` is `conservative` itself. In a checkout the other two are links in it, which `rglob` does not follow.
+"""
 
 
-Part = Finding | Verified
-"""A part of the result of a study, or of the verification."""
+Result = Finding | Verified
+"""A result of a study, or of the verification."""
 Origin = dict[str, str]
 """A process: its `command`, `start` time and `commit` (see `Provenance`)."""
 
@@ -46,7 +49,7 @@ Origin = dict[str, str]
 class StudyResult:
     """The findings of a study or of the verification, and the process that measured it."""
 
-    findings: tuple[Part, ...]
+    findings: tuple[Result, ...]
     by: Origin
 
 
@@ -64,7 +67,7 @@ class Checkpoint:
     process: Origin
     results: dict[str, StudyResult] = field(default_factory=dict)
 
-    def store(self, name: str, findings: Iterable[Part]) -> None:
+    def store(self, name: str, findings: Iterable[Result]) -> None:
         """Store the findings of a study, also in the file. Raise `NotWritten` if that fails."""
         result = StudyResult(tuple(findings), self.process)
         studies = {
@@ -153,6 +156,7 @@ def begin(plan: Plan, out: Path, source: Provenance, resume: bool) -> Checkpoint
             got = f"True, for the scene {scene.name!r} with {unknown}, which cannot be compared with the earlier scene"
             raise BadInput("resume", got, "no --resume, to start again, or scenes made of numbers, tables and pure functions")
     command, before, results = read(path)
+    # The new terms as they would be read back.
     if different := list(differences(before, json.loads(json.dumps(fresh.terms)))):
         more = f" and {len(different) - _MOST_DIFFERENCES} more" if len(different) > _MOST_DIFFERENCES else ""
         got = f"{str(path)!r}, which was made with {'; '.join(different[:_MOST_DIFFERENCES])}{more}"
@@ -187,7 +191,7 @@ def _source_hash() -> str:
     root = Path(__file__).parents[2]
     digest = hashlib.sha256()
     for file in sorted(
-        {file for room in _PACKAGES for file in (root / room).rglob("*.py")} - set((root / "reports").rglob("*"))
+        {file for package in _PACKAGES for file in (root / package).rglob("*.py")} - set((root / "reports").rglob("*"))
     ):
         digest.update(f"{file.relative_to(root)}\n".encode() + file.read_bytes())
     return digest.hexdigest()[:12]

@@ -26,7 +26,7 @@ from conservative.references.worker.calls import run_within
 from conservative.references.worker.client import kill_workers
 
 from ..terminal.progress import Tell, announce
-from .checkpoint import VERIFICATION, Checkpoint, Part
+from .checkpoint import VERIFICATION, Checkpoint, Result
 from .plan import Plan
 from .provenance import Provenance
 from .verification import Verified, to_plain, verify_methods
@@ -56,7 +56,7 @@ class Measurements:
     verified: tuple[Verified, ...] = ()
 
     @classmethod
-    def of(cls, findings: Iterable[Part]) -> Measurements:
+    def of(cls, findings: Iterable[Result]) -> Measurements:
         """Return the tables of the findings of studies, and those on engines."""
         results = list(findings)
         return cls(

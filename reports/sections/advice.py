@@ -15,7 +15,7 @@ from ..rows.names import MethodClass
 from . import random_bodies
 from .measured import Measured, of_scene
 from .ratios import ratio_cell
-from .scene_ratios import sides
+from .scene_ratios import ratios_of_class
 from .summary import ERRORS
 
 HEADER = ("motion", "error, rad", "use", "µs per simulated s", "fastest engine or solver", "its time / ours", "repeat with")
@@ -34,7 +34,7 @@ def section(measured: Measured) -> Section:
         points, general_times = of_scene(measured.points, scene.name), dict[float, float]()
         for kind, fastest in families.items():
             errors = ERRORS if kind is MethodClass.GENERAL else ERRORS[-1:]
-            for side in sides(costs(points, errors), kind, errors):
+            for side in ratios_of_class(costs(points, errors), kind, errors):
                 if side.ours and side.ours.time < general_times.get(side.error, math.inf):  # a closed form has to be faster
                     general_times[side.error] = side.ours.time
                     line = points[points["name"] == side.ours.name]

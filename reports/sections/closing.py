@@ -34,8 +34,8 @@ class Line:
     """A method with a setting on a scene, and how its run at the scene's own step ended.
 
     Attributes: `drifts`, the largest of each invariant, relative; `error`, the largest attitude error, rad; `order`, measured;
-    `step` and `second`, the wall time per step and per simulated second, s; `reached`, the wall time per simulated second at
-    the attitude error `MIDDLE`, s. All are NaN if they were not measured.
+    `time_per_step` and `time_per_second`, the wall time per step and per simulated second, s; `reached`, the wall time per
+    simulated second at the attitude error `MIDDLE`, s. All are NaN if they were not measured.
     """
 
     name: str
@@ -44,8 +44,8 @@ class Line:
     drifts: dict[str, float]
     error: float
     order: float
-    step: float
-    second: float
+    time_per_step: float
+    time_per_second: float
     reached: float
 
 
@@ -53,7 +53,7 @@ def scene_lines(table: pd.DataFrame, points: pd.DataFrame, scene: Scene, named: 
     """Yield a line for each method on a scene, in the order of measurement.
 
     The table comes from `names.with_names`; the points belong to the scene (see `rows.points`). If the methods were `named`,
-    each has its line, also if it does not support the scene or is not installed. Otherwise such methods have none, and methods
+    each has a line, even if it does not support the scene or is not installed. Otherwise such methods have none, and methods
     that differ only in tolerance are one line, with the drifts and errors of the default tolerance, which is the last.
     """
     accuracy = of_study(table, paper.STUDY.name, scene.name)
@@ -94,7 +94,7 @@ def scene_table(table: pd.DataFrame, points: pd.DataFrame, scene: Scene, named: 
         if not line.outcome.ok:
             failed.setdefault((line.family, str(outcome_cell(line.outcome, reason=True))), []).append(line.name)
             continue
-        order, step = _order(line), number(line.step * 1e6)
+        order, step = _order(line), number(line.time_per_step * 1e6)
         body.append([line.name, *map(bound, line.drifts.values()), angle(line.error), order, step, factor(line.reached * 1e6)])
     header = ["method", *(invariant.name for invariant in scene.invariants), *HEADER]
     # In the first cell, because a terminal has no room for a column of reasons.
@@ -103,7 +103,7 @@ def scene_table(table: pd.DataFrame, points: pd.DataFrame, scene: Scene, named: 
 
 
 def paper_table(table: pd.DataFrame, points: Mapping[str, pd.DataFrame], scenes: Iterable[Scene]) -> Table:
-    """Return the error, drift, order and time of each scheme, for a paper, sorted by scene and name, without regard to authors.
+    """Return the error, drift, order and time of each scheme, for a paper, sorted by scene and name, ours or not.
 
     A scheme that failed has the outcome in place of its error.
     """
@@ -113,7 +113,7 @@ def paper_table(table: pd.DataFrame, points: Mapping[str, pd.DataFrame], scenes:
         for line in sorted(scene_lines(table, points[scene.name], scene), key=lambda line: line.name.casefold()):
             if line.outcome.ok:
                 drift = max(line.drifts.values(), default=math.nan)
-                cells = [angle(line.error), bound(drift), _order(line), number(line.second * 1e6)]
+                cells = [angle(line.error), bound(drift), _order(line), number(line.time_per_second * 1e6)]
             else:
                 cells = [str(outcome_cell(line.outcome)), *[DASH] * 3]
             body.append([line.name, scene.name, *cells])

@@ -33,6 +33,7 @@ TERMS = (
 LINE = ["scene", "name", "line", "way", "family", "class"]
 """Columns that identify a method in one way of running many bodies; `name` includes the way, `line` does not."""
 STATISTICS = (MEDIAN, MOST)
+"""Statistics of the errors of bodies, for which ratios are computed."""
 
 
 def section(table: pd.DataFrame, samples: pd.DataFrame) -> Section:

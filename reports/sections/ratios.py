@@ -11,7 +11,7 @@ from ..rows.names import MethodClass
 from ..rows.points import DECADES
 from .measured import Measured
 from .random_bodies import ANY, RandomRatios
-from .scene_ratios import sides
+from .scene_ratios import ratios_of_class
 
 _RATIOS = (
     "The time of the fastest engine or ODE solver divided by our fastest method's time, at each decade of the largest "
@@ -45,7 +45,7 @@ def ratio_table(measured: Measured) -> Table:
         runs |= {f"{scene.name}, {label}": reached for label, reached in every_step.runs.items()} if every_step else {}
         for label, reached in runs.items():
             for kind in (MethodClass.GENERAL, MethodClass.SOLUTION):
-                speed_ratios = sides(reached, kind)
+                speed_ratios = ratios_of_class(reached, kind)
                 if any(speed_ratio.ours for speed_ratio in speed_ratios):
                     cells = {speed_ratio.error: ratio_cell(speed_ratio) for speed_ratio in speed_ratios}
                     faster = (

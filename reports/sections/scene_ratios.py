@@ -25,7 +25,9 @@ HEADER = (
 
 @dataclass(frozen=True, eq=False)
 class EachStep:
-    """Methods at their coarsest setting with an error of at most `ERROR` at each of a scene's own steps, `interval` s apart.
+    """Costs of methods with a scene's own steps, `interval` s apart, stored.
+
+    Each method is at its coarsest setting with an error of at most `ERROR` at each of these steps.
 
     `runs` are the costs (see `speed_ratio.costs`) at `ERROR` by name: of runs with every step stored, of the same without an
     engine's conversion of its states, and of runs with the final state only.
@@ -53,7 +55,7 @@ def each_step(table: pd.DataFrame, scene: str) -> EachStep | None:
     return EachStep(interval, runs)
 
 
-def sides(reached: pd.DataFrame, kind: MethodClass, errors: Sequence[float] = DECADES) -> list[SpeedRatio]:
+def ratios_of_class(reached: pd.DataFrame, kind: MethodClass, errors: Sequence[float] = DECADES) -> list[SpeedRatio]:
     """Return the ratios of one class of ours to all engines, on each scene, at each error that either side reaches."""
     ours, theirs = of_classes(reached, kind), of_classes(reached, *OF_ENGINES)
     return [
@@ -79,7 +81,7 @@ def as_table(points: pd.DataFrame, interval: float, each_step: EachStep | None =
 def _rows(reached: pd.DataFrame, interval: float, errors: tuple[float, ...]) -> Iterator[tuple[float, Row]]:
     """Yield each error that any method reaches, large ones first, and its cost in each class."""
     general, solutions = (
-        {speed_ratio.error: speed_ratio for speed_ratio in sides(reached, kind, errors)}
+        {speed_ratio.error: speed_ratio for speed_ratio in ratios_of_class(reached, kind, errors)}
         for kind in (MethodClass.GENERAL, MethodClass.SOLUTION)
     )
 
@@ -93,6 +95,6 @@ def _rows(reached: pd.DataFrame, interval: float, errors: tuple[float, ...]) -> 
 
     for error in errors:
         ours, solved = general.get(error), solutions.get(error)
-        if either := ours or solved:
+        if either := ours or solved:  # the engines are the same in both
             first, second = (cells(speed_ratio.ours if speed_ratio else None) for speed_ratio in (ours, solved))
             yield error, [*first, *cells(either.theirs), ratio(ours), *second, ratio(solved)]

@@ -33,7 +33,7 @@ def _mistakes(findings: Sequence[Finding]) -> str:
 
 
 def changes(versions: Sequence[tuple[str, Sequence[Verified]]]) -> list[str]:
-    """Return a sentence for each case that became right or wrong from one version of an engine to the next.
+    """Return a sentence for each case that changed between right and wrong from one version of an engine to the next.
 
     `versions` are names, and the findings on the same settings in the same order.
     """

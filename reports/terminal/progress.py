@@ -12,7 +12,7 @@ from time import monotonic
 Tell = Callable[[float, str], None]
 """Called with the finished share of all work, 0 to 1, and a description of the next piece."""
 DELAY = 1.0
-"""Time, s, after which a bar appears."""
+"""Time, s, after which the bar of `show_waiting` appears, or without a terminal a title."""
 SILENCE = 10.0
 """Time, s, between two lines where there is no bar."""
 

@@ -298,7 +298,7 @@ def test_a_top_on_its_tip_is_the_cone_of_its_moments_and_other_bodies_are_boxes(
     assert sum(tetrahedra) == pytest.approx(np.pi / 3 * radius**2 * height, rel=0.01)  # the surface is closed; measured 0.003
     offset = cv.Scene("offset", BODY, R0, (0.1, 0.2, 0.3), 0.1, cv.UniformGravity(1.0, (0.1, 0.2, 0.3)))
     _, (panel,) = make_panels([cv.integrate(offset, 0.01)], ["a"], None)
-    assert (panel.solid.shape, panel.solid.leave(np.array([0.0, 0.0, 9.0]))) == ("box", panel.solid.size[2] / 18)
+    assert (panel.solid.shape, panel.solid.share_inside(np.array([0.0, 0.0, 9.0]))) == ("box", panel.solid.size[2] / 18)
 
 
 @pytest.mark.parametrize(("truth", "entries"), [(None, 3), (1, 4)])

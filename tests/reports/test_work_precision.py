@@ -21,7 +21,7 @@ ENGINE = (point("engine", "engine", 1e-3, 2.0, dt=0.2), point("engine", "engine"
 
 
 def speed_ratios(found, errors=work_precision.DECADES):
-    return scene_ratios.sides(costs(found, errors), MethodClass.GENERAL, errors)
+    return scene_ratios.ratios_of_class(costs(found, errors), MethodClass.GENERAL, errors)
 
 
 def speed_ratio(error, *groups):

@@ -300,6 +300,7 @@ def extrapolated(f: Bodies, t: Array, y: Array, h: Array, past: list[Array]) -> 
 
 RK4 = (((0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)), (1 / 6, 1 / 3, 1 / 3, 1 / 6))
 EIGHTHS = (((1 / 3,), (-1 / 3, 1.0), (1.0, -1.0, 1.0)), (1 / 8, 3 / 8, 3 / 8, 1 / 8))
+"""Rows of A, and b, of Runge and Kutta's rules of order 4: the classical one, and the rule of three eighths."""
 STEPS: dict[int, dict[str, Next]] = {
     1: {
         "explicit Euler": partial(tableau, A=(), b=(1.0,)),

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from conservative.attitude import Array, rotation_about, to_quaternion
-from conservative.body import RigidBody, find_impossible
+from conservative.body import RigidBody, is_impossible
 from conservative.grid import Grid
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.references.engine import principal_axes
@@ -77,7 +77,7 @@ class Description:
     @property
     def possible(self) -> bool:
         """True if a mass distribution has this inertia."""
-        return not find_impossible(np.asarray(np.linalg.eigvalsh(self.inertia), dtype=float))
+        return not is_impossible(np.asarray(np.linalg.eigvalsh(self.inertia), dtype=float))
 
     @property
     def scene(self) -> Scene:

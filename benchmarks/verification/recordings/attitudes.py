@@ -13,21 +13,21 @@ from .layout import Layout, Options
 
 
 def convert(values: Array, layout: Layout, options: Options) -> tuple[Array, States, Array | None]:
-    """Return times, motion and shape of rows in SI units.
+    """Return times, motion and `unit_errors` of rows in SI units.
 
-    The shape (n,) is measured before attitudes are repaired: norms of quaternions minus 1, or |R'R - 1| of matrices.
+    `unit_errors` (n,) are measured before attitudes are repaired: norms of quaternions minus 1, or |R'R - 1| of matrices.
     """
     count = 1 + len(layout.used["rates"])
-    w, (R, shape) = values[:, 1:4] if count > 1 else None, to_matrices(values[:, count:], layout.attitude, options)
+    w, (R, unit_errors) = values[:, 1:4] if count > 1 else None, to_matrices(values[:, count:], layout.attitude, options)
     if w is not None:
         w = np.where(np.abs(w) < SMALLEST, 0.0, w)  # no scene has such rates
         if options.world and R is not None:
             w = (w[:, None] @ R)[:, 0]
-    return values[:, 0], (R, w), shape
+    return values[:, 0], (R, w), unit_errors
 
 
 def to_matrices(x: Array, kind: str | None, options: Options) -> tuple[Array | None, Array | None]:
-    """Return matrices (n, 3, 3) and the shape (n,) of attitudes of a kind; None without attitudes, or without a shape."""
+    """Return matrices (n, 3, 3) and `unit_errors` (n,) of attitudes of a kind; None without them."""
     if kind is None:
         return None, None
     if kind == "quaternion":

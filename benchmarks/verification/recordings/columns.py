@@ -16,6 +16,7 @@ from .names import LONGEST_NAME, UNITS, split_name
 from .units import no_unit
 
 MOST_COLUMNS = 10_000
+"""Largest number of columns of a file."""
 MOVES = "an attitude relative to a frame that moves"
 HORIZON = "angles to the local horizon, which moves; --euler zyx if they turn body to inertial axes"
 SEQUENCE = "their sequence is not known; add --euler with it, such as --euler zyx"

@@ -30,7 +30,7 @@ from ..compare import (
     linearise,
     take_rows,
 )
-from ..solution import States, closed, truth
+from ..solution import States, has_closed_form, truth
 from .table import Recording
 
 MOST_NOISE = 0.05
@@ -158,7 +158,7 @@ def _find_noise(
     other: Any
     noise, resolved = estimate_noise(t, data)
     if (SIGMAS * noise / sizes > digits).any() and len(t) >= FEWEST_FOR_NOISE:
-        n = len(t) if closed(scene) else int(np.searchsorted(t + shift, start + NUMERICAL / scale))
+        n = len(t) if has_closed_form(scene) else int(np.searchsorted(t + shift, start + NUMERICAL / scale))
         (R, w), (a, b) = truth(scene, start, t[:n] + shift), take_rows(data, slice(0, n))
         rest: States = None if a is None else np.swapaxes(R, 1, 2) @ a, None if b is None else b - w
         if all(x is None or np.isfinite(x).all() for x in (*rest, R, w)):
@@ -199,10 +199,10 @@ def compare(case: Compared, recording: Recording, from_row: bool) -> Comparison:
     """Compare the rows that are kept for fits, and if they agree, all rows of the file."""
     undecided, shift = "", float(recording.t[0] - case.t[0])
     gap = float(np.median(np.diff(case.t))) * case.scale
-    if not closed(case.scene) and gap > NUMERICAL / 10:
+    if not has_closed_form(case.scene) and gap > NUMERICAL / 10:
         got = f"rows between which the body turns by {gap:.2g} rad"
         raise BadInput("run", recording.label(got), "closer rows, or the unit of the time in the header, such as time (ms)")
-    if not closed(case.scene) and len(near := case.first(NUMERICAL, 2).t) < len(case.t):
+    if not has_closed_form(case.scene) and len(near := case.first(NUMERICAL, 2).t) < len(case.t):
         case = case.take(slice(0, len(near)))
         undecided = f"Rows after {case.t[-1] + shift:g} s are not compared: no closed form is known. A shorter file decides"
     parts, missing, alone = _stretches(case, from_row)
@@ -212,7 +212,7 @@ def compare(case: Compared, recording: Recording, from_row: bool) -> Comparison:
     if not passed and not (whole and (parts[0].error[:, 0] <= case.allowed).all()):  # stretches and starts of right motions
         parts, errors = [replace(case, growth=parts[0].growth)], case.error
     worst, compared, outliers = errors, len(case.t), _outliers(errors, case, recording)
-    shape = _largest(recording.t, recording.shape)
+    shape = _largest(recording.t, recording.unit_errors)
     if (passed or outliers) and recording.rows > len(recording.t) and not undecided:
         worst, compared, bad, shape = _compare_all(parts, recording, -shift if from_row else 0.0)
         passed = passed and bad is None
@@ -308,7 +308,7 @@ def _compare_all(
                 row = int(np.flatnonzero(some)[off[0]])
                 bad = int(numbers[row]), float(t[row]), float(error[:, off[0]].max())
             worst = np.maximum(worst, error.max(axis=1, keepdims=True))
-            if not closed(part.scene):
+            if not has_closed_form(part.scene):
                 scene = part.scene.rename("file", R_WB0=R[-1], w_WB_B0=w[-1])
                 current[i] = replace(part, scene=scene, start=float(piece.t[-1]))
         count += len(t)
@@ -331,7 +331,10 @@ def _late(case: Compared) -> bool:
 
 
 def _outliers(errors: Array, case: Compared, recording: Recording) -> list[tuple[int, float, float]]:
-    """Return number, time and error of rows that are off while at least 98 of 100 others agree."""
+    """Return number, time and error of rows that are clearly off while all others, at least 98 of 100 rows, agree.
+
+    The first row has to agree, too.
+    """
     wrong = (errors > case.allowed[:, None]).any(axis=0)
     off, rest = np.flatnonzero(wrong), case.take(~wrong)
     if not 0 < len(off) <= 0.02 * len(case.t) or 0 in off or not rest.passes(errors[:, ~wrong]) or _late(rest):
@@ -341,7 +344,7 @@ def _outliers(errors: Array, case: Compared, recording: Recording) -> list[tuple
     return [(recording.number(k), float(case.t[k]), float(errors[:, k].max())) for k in off]
 
 
-def _largest(t: Array, shape: Array | None) -> tuple[float, float]:
+def _largest(t: Array, unit_errors: Array | None) -> tuple[float, float]:
     """Return the largest departure from a rotation, and its time, s."""
-    k = 0 if shape is None else int(np.argmax(np.abs(shape)))
-    return (0.0 if shape is None else float(np.abs(shape[k]))), float(t[k])
+    k = 0 if unit_errors is None else int(np.argmax(np.abs(unit_errors)))
+    return (0.0 if unit_errors is None else float(np.abs(unit_errors[k]))), float(t[k])

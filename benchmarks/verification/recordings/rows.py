@@ -31,15 +31,15 @@ SHORT = 3.0
 class Cleaner:
     """Leaves rows out, chunk by chunk, counts them, and refuses rows that cannot be used.
 
-    `wraps` is the number of steps back of a counter, `ended` the number of rows without numbers at the end.
+    `wraps` is the number of steps back of a counter, `empty_at_end` the number of rows without numbers at the end.
     """
 
     path: Path
     layout: Layout
     options: Options
-    left: Counter[str] = field(default_factory=Counter)
+    left_out: Counter[str] = field(default_factory=Counter)
     wraps: int = 0
-    ended: int = 0
+    empty_at_end: int = 0
     rows: int = 0
     offset: float = 0.0
     gap: float = math.nan
@@ -52,7 +52,7 @@ class Cleaner:
         self.rows += len(values)
         values = self.layout.join_time(values)
         timed = ~np.isnan(values[:, 0])
-        self.left[GAP] += int((~timed).sum())
+        self.left_out[GAP] += int((~timed).sum())
         values, numbers = values[timed].copy(), numbers[timed]
         t = values[:, 0]
         steps = np.diff(t, prepend=self.before - self.offset)
@@ -80,19 +80,19 @@ class Cleaner:
             inside &= t >= self.options.start_time
         if self.options.end_time is not None:
             inside &= t <= self.options.end_time
-        self.left[OUTSIDE] += int((~inside).sum())
+        self.left_out[OUTSIDE] += int((~inside).sum())
         values, numbers = values[inside], numbers[inside]
         gaps: Any = np.isnan(values[:, :width]).any(axis=1)
-        self.left[GAP] += int(gaps.sum())
+        self.left_out[GAP] += int(gaps.sum())
         if len(gaps):
             trailing = int(np.argmin(gaps[::-1])) if not gaps.all() else len(gaps)
-            self.ended = trailing + (self.ended if gaps.all() else 0)
+            self.empty_at_end = trailing + (self.empty_at_end if gaps.all() else 0)
         values, numbers = values[~gaps], numbers[~gaps]
         if len(values):
             rows = np.vstack([self.last, values[:, :width]]) if self.last.size else values[:, :width]
             same = (rows[1:] == rows[:-1]).all(axis=1)
             same = same if self.last.size else np.append(False, same)
-            self.left[REPEATED] += int(same.sum())
+            self.left_out[REPEATED] += int(same.sum())
             values, numbers = values[~same], numbers[~same]
         self._refuse(values[:, :width], numbers)
         self.last = values[-1, :width] if len(values) else self.last
@@ -130,7 +130,7 @@ class Cleaner:
     @property
     def notes(self) -> list[str]:
         """Sentences on rows that were left out."""
-        out = [f"Left out: {count:,} row{'s' * (count > 1)} {reason}." for reason, count in self.left.items() if count]
+        out = [f"Left out: {count:,} row{'s' * (count > 1)} {reason}." for reason, count in self.left_out.items() if count]
         if self.wraps:
             out.append(f"The counter of the time began again {self.wraps} time{'s' * (self.wraps > 1)}; the times go on there.")
         return out

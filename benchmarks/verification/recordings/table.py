@@ -34,16 +34,16 @@ ROWS = 2000
 class Recording:
     """A recorded motion at times t (n,), s, of the file; it has `rows` rows, of which n are kept for fits.
 
-    `shape` (n,) has what is measured before attitudes are repaired: norms of quaternions minus 1, or |R'R - 1| of matrices.
+    `unit_errors` (n,) are measured before attitudes are repaired: norms of quaternions minus 1, or |R'R - 1| of matrices.
     `order_known` is False if the order of quaternions is a guess. `digits` are the largest round-off of times, s, attitudes,
     rad, and rates, rad/s, that the digits in the file stand for. `path` is None for a motion that is not a file. `numbers` (n,)
-    are rows in the file, from 1, `left` has the numbers of rows that were left out by reason, and `ended` is the number of rows
-    without numbers at the end. `others` are attitudes in other columns.
+    are rows in the file, from 1, `left_out` has the numbers of rows that were left out by reason, and `empty_at_end` is the
+    number of rows without numbers at the end. `others` are attitudes in other columns.
     """
 
     t: Array
     data: States
-    shape: Array | None = None
+    unit_errors: Array | None = None
     order_known: bool = True
     degrees: bool = False
     rows: int = 0
@@ -52,8 +52,8 @@ class Recording:
     options: Options = field(default_factory=Options)
     path: Path | None = None
     numbers: Any = None
-    left: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
-    ended: int = 0
+    left_out: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
+    empty_at_end: int = 0
     others: Sequence[Other] = ()
 
     def label(self, text: str) -> str:
@@ -66,8 +66,8 @@ class Recording:
 
     def doubt(self, error: float | None) -> str:
         """Return the sentence on parts of the file that were not compared, or differ from the compared ones; "" without any."""
-        if self.ended:
-            return f"The last {self.ended} rows have no numbers, so the file does not show the end of its motion"
+        if self.empty_at_end:
+            return f"The last {self.empty_at_end} rows have no numbers, so the file does not show the end of its motion"
         for other in self.others:
             allowed = other.allowed(self.digits[1]) if error is None else error
             if not other.difference <= allowed:
@@ -75,10 +75,10 @@ class Recording:
         return self.layout.doubt
 
     def stream(self) -> Iterator[tuple[Array, States, Array | None, Any]]:
-        """Yield times, motion, shape and numbers of all rows, in chunks."""
+        """Yield times, motion, `unit_errors` and numbers of all rows, in chunks."""
         if self.path is None or self.rows == len(self.t):
             numbers = 1 + np.arange(len(self.t)) if self.numbers is None else self.numbers
-            yield self.t, self.data, self.shape, numbers
+            yield self.t, self.data, self.unit_errors, numbers
             return
         cleaner = Cleaner(self.path, self.layout, self.options)
         for values in open_table(self.path).rows(self.layout.columns):
@@ -123,6 +123,7 @@ def _read(path: Path, options: Options) -> tuple[Recording, dict[str, BadInput]]
     cleaner, kept, numbers = Cleaner(path, layout, options), list[Array](), list[Array]()
     every, rows, first, last = 1, 0, True, math.nan
     extra = [name for part in layout.also.values() for name in part]
+    # The time, then the columns of rates and attitudes; `extra` follows.
     width = 1 + sum(map(len, [*layout.used.values()][1:]))
     for chunk in table.rows([*layout.columns, *extra]):
         if first and len(chunk):
@@ -141,17 +142,17 @@ def _read(path: Path, options: Options) -> tuple[Recording, dict[str, BadInput]]
             kept, numbers, every = [np.concatenate(kept)[::2]], [np.concatenate(numbers)[::2]], 2 * every
         last = values[-1, 0] if len(values) else last
     if rows < 2:
-        left = "".join(f", and {count} {reason}" for reason, count in cleaner.left.items() if count)
+        left = "".join(f", and {count} {reason}" for reason, count in cleaner.left_out.items() if count)
         raise BadInput("run", f"{path} with {rows} rows{left}", "a header and two rows or more")
     raw = np.concatenate(kept)
     if (duration := float(last - raw[0, 0]) * float(layout.sizes[0])) < SMALLEST:
         raise BadInput("run", f"{path} with rows within {duration:g} s", f"times that differ by {SMALLEST:g} s or more")
-    t, data, shape = convert(raw[:, :width] * layout.sizes, layout, options)
+    t, data, unit_errors = convert(raw[:, :width] * layout.sizes, layout, options)
     layout.notes += cleaner.notes
     recording = Recording(
         t,
         data,
-        shape,
+        unit_errors,
         order_known=options.quaternion is not None or not layout.numbered,
         degrees=any(abs(size - math.pi / 180) < 1e-6 for size in layout.used["rates"].values()),
         rows=rows,
@@ -160,8 +161,8 @@ def _read(path: Path, options: Options) -> tuple[Recording, dict[str, BadInput]]
         options=options,
         path=path,
         numbers=np.concatenate(numbers),
-        left={reason: count for reason, count in cleaner.left.items() if count},
-        ended=cleaner.ended,
+        left_out={reason: count for reason, count in cleaner.left_out.items() if count},
+        empty_at_end=cleaner.empty_at_end,
         others=compare_others(data[0], raw[:, width:], layout, options),
     )
     return recording, unused
@@ -176,6 +177,7 @@ def _unused(layout: Layout, options: Options) -> dict[str, BadInput]:
         out["quaternion"] = f"{options.quaternion!r}, for a file without numbered quaternions", "no --quaternion"
     if options.world and not layout.used["rates"]:
         out["rates"] = "'world', for a file without rates", "body, or a file with attitudes and rates"
+    # `columns.choose` adds the note "unit" if --units applies to a column.
     if options.units is not None and "unit" not in layout.notes:
         out["units"] = f"{options.units!r}, for a file whose columns name their units", "no --units"
     return {argument: BadInput(argument, got, allowed) for argument, (got, allowed) in out.items()}

@@ -211,7 +211,7 @@ def verify_recording(
         first_row=_pair(comparison.alone),
         units=units,
         compared=comparison.compared,
-        in_file=recording.rows + sum(recording.left.values()),
+        in_file=recording.rows + sum(recording.left_out.values()),
         used={kind: tuple(part) for kind, part in recording.layout.used.items() if part},
         unused={shorten(column): reason for column, reason in recording.layout.unused.items()},
         shape="" if shaped else _misshapen(comparison, recording),
@@ -318,9 +318,9 @@ def _series(comparison: Comparison, recording: Recording, from_row: bool) -> tup
         if size
     }
     series |= _drifts(case, from_row)
-    if recording.shape is not None:
+    if recording.unit_errors is not None:
         name = "|R'R - 1|" if recording.layout.attitude == "matrix" else "quaternion norm, minus 1"
-        series[name] = np.abs(recording.shape)[: len(case.t)]
+        series[name] = np.abs(recording.unit_errors)[: len(case.t)]
     return series, units
 
 

@@ -24,8 +24,8 @@ from .traced import REGISTER as REGISTER
 from .traced import trace
 
 WIDTH = 2 * FOUR if COMPILED else 1
-"""Number of bodies in most kernels: two registers of most processors, so that these work on one while they wait for the other.
-Kernels whose numbers fill the registers of a processor already use `REGISTER`."""
+"""Number of bodies in most kernels: two registers of most processors, so that a processor works on one while it waits for the
+other. Kernels whose numbers fill the registers of a processor already use `REGISTER`."""
 
 
 def _flatten(value):
@@ -40,40 +40,40 @@ if COMPILED:
 
     from .traced import DOUBLE, INDEX, Lanes, Mask, Symbol, floats_in_register, pack, unpack
 
-    def _register(symbol, operation, first, result):
-        """Let numba compile `symbol` for lanes as the operation on their symbols."""
+    def _compile_for_lanes(symbol, operation, operand, result):
+        """Let numba compile `symbol` for the type `operand`, Lanes or Mask, as the operation on their symbols."""
         unary = symbol in (operator.neg, operator.invert, math.sqrt, abs)
 
         def result_of(*kinds):
             """Return the type of the result. None refuses the arguments: lanes go with lanes of their width and with numbers,
             masks only with masks.
             """
-            widths = {kind.width for kind in kinds if isinstance(kind, first)}
-            others = [kind for kind in kinds if not isinstance(kind, first)]
-            fits = (all(isinstance(kind, types.Float | types.Integer) for kind in others) and first is Lanes) or not others
+            widths = {kind.width for kind in kinds if isinstance(kind, operand)}
+            others = [kind for kind in kinds if not isinstance(kind, operand)]
+            fits = (all(isinstance(kind, types.Float | types.Integer) for kind in others) and operand is Lanes) or not others
             return result(*widths) if len(widths) == 1 and fits else None
 
         # numba passes the arguments of a function with *kinds as one tuple
         type_callable(symbol)(lambda _: (lambda a: result_of(a)) if unary else (lambda a, b: result_of(a, b)))
 
         def lower(context, builder, sig, args):
-            # No flags: the flags of the function that is being compiled decide whether products may be fused.
+            # () are the fast-math flags: those of the function that is being compiled decide whether products may be fused.
             numbers = (unpack(builder, *typed, ()) for typed in zip(sig.args, args, strict=True))
             return pack(context, builder, sig.return_type, operation(*numbers))
 
         pairs = ((Lanes, Lanes), (Lanes, types.Number), (types.Number, Lanes))
-        for kinds in [(first,)] if unary else [(Mask, Mask)] if first is Mask else pairs:
+        for kinds in [(operand,)] if unary else [(Mask, Mask)] if operand is Mask else pairs:
             lower_builtin(symbol, *kinds)(lower)
 
     for _symbol in (operator.add, operator.sub, operator.mul, operator.truediv, operator.neg, abs):
-        _register(_symbol, _symbol, Lanes, Lanes)
-    _register(math.sqrt, arithmetic.root, Lanes, Lanes)
-    _register(min, lambda a, b: arithmetic.choose(b < a, b, a), Lanes, Lanes)
-    _register(max, lambda a, b: arithmetic.choose(b > a, b, a), Lanes, Lanes)
+        _compile_for_lanes(_symbol, _symbol, Lanes, Lanes)
+    _compile_for_lanes(math.sqrt, arithmetic.root, Lanes, Lanes)
+    _compile_for_lanes(min, lambda a, b: arithmetic.choose(b < a, b, a), Lanes, Lanes)
+    _compile_for_lanes(max, lambda a, b: arithmetic.choose(b > a, b, a), Lanes, Lanes)
     for _comparison in (operator.lt, operator.le, operator.gt, operator.ge, operator.eq):
-        _register(_comparison, _comparison, Lanes, Mask)
+        _compile_for_lanes(_comparison, _comparison, Lanes, Mask)
     for _logical in (operator.and_, operator.or_, operator.invert):
-        _register(_logical, _logical, Mask, Mask)
+        _compile_for_lanes(_logical, _logical, Mask, Mask)
 
     def _place(context, builder, array, index, register=DOUBLE):
         """Return the address of an element as a pointer to a register; `array` is a numba type and a value."""
@@ -156,7 +156,10 @@ if COMPILED:
 
     @intrinsic
     def save_rows(typing, array, index, stride, values):
-        """Store the numbers of a tuple of tuples at index, index + stride and so on. An array of rows counts as flat."""
+        """Store the numbers of a tuple of tuples at index, index + stride and so on.
+
+        `array` may also have rows; the index counts its floats in order.
+        """
 
         def build(context, builder, sig, args):
             at = args[1]

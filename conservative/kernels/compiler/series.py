@@ -37,6 +37,7 @@ from .traced import join, lanes_like
 LOWEST, HIGHEST = 4, 18
 """Lowest and highest order. Code for higher orders does not fit into the processor's instruction cache."""
 LOOPS_FROM = 6
+"""Lowest order whose sums of many bodies are loops instead of unrolled code."""
 TURNED, TWICE = (1, 2, 0, 1), (2, 0, 1, 2)
 """Indices that turn (x1, x2, x3) into (x2, x3, x1) and (x3, x1, x2), or back: each undoes the other."""
 

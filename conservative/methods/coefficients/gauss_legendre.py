@@ -11,7 +11,9 @@ import numpy as np
 from ...attitude import Array
 
 MOST_STAGES = 10
+"""Largest number of stages."""
 DIGITS = 60
+"""Decimal digits in which coefficients are computed."""
 
 
 @dataclass(frozen=True, eq=False)

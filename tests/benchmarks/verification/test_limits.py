@@ -61,7 +61,7 @@ def test_half_digits_in_the_largest_error_and_in_the_mean(half, rows, sizes):
         assert verify(turned(size * half, rows), digits=(0.0, half, 0.0)).verdict == expected
         assert verify(None, moved(size * half, rows), digits=(0.0, 0.0, half)).verdict == expected
     if rows == 300:
-        shapes = [verify(R, shape=np.full(len(T), size * half), digits=(0.0, half, 0.0)).verdict for size in sizes]
+        shapes = [verify(R, unit_errors=np.full(len(T), size * half), digits=(0.0, half, 0.0)).verdict for size in sizes]
         assert shapes == ["right", "wrong"]
 
 
@@ -71,7 +71,7 @@ def test_round_off_and_the_errors_of_good_solvers():
     assert double == ["right", "undecided", "undecided", "wrong"]
     single = [verify(turned(angle), digits=(0.0, 6e-8, 6e-8)).verdict for angle in (1.3e-7, 2e-7, 0.7e-4, 1.4e-4)]
     assert single == ["right", "undecided", "undecided", "wrong"]
-    shapes = [verify(R, shape=np.full(len(T), size)).verdict for size in (0.7e-6, 1.4e-6)]
+    shapes = [verify(R, unit_errors=np.full(len(T), size)).verdict for size in (0.7e-6, 1.4e-6)]
     assert shapes == ["right", "wrong"]
 
 

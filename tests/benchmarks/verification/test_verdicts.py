@@ -175,8 +175,8 @@ def test_a_single_row_is_found_in_the_whole_file(tmp_path):
 
 def test_matrices_that_are_no_rotations_are_not_right():
     scaled = np.abs((1 + 0.05 * T) ** 2 - 1)
-    assert verdict(T, R, W, shape=scaled).verdict == "wrong"
-    assert verdict(T, R, W, shape=1e-12 * scaled).verdict == "right"
+    assert verdict(T, R, W, unit_errors=scaled).verdict == "wrong"
+    assert verdict(T, R, W, unit_errors=1e-12 * scaled).verdict == "right"
 
 
 def product(p, q):
