@@ -25,6 +25,7 @@ from conservative.method import Method, Role
 from conservative.methods.between import SampleTimes
 from conservative.methods.many import Block, pause
 from conservative.methods.trials import Estimate
+from conservative.outcome import ProgressOfMany
 from conservative.trajectory import Trajectory
 
 from ..environments import wait_until
@@ -168,6 +169,11 @@ def test_progress_is_reported_after_each_block(monkeypatch):
 @pytest.fixture(scope="module")
 def ensemble():
     return cv.integrate_many(scene(), *starts(N), **SAMPLES)
+
+
+def test_bodies_that_were_there_count_for_no_speed():
+    progress = ProgressOfMany(elapsed=2.0, done=50, total=100, found=30)
+    assert progress.rate == 10.0
 
 
 def test_parts_of_an_ensemble(ensemble):

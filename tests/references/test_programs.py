@@ -13,6 +13,7 @@ import conservative as cv
 from conservative import deferred_imports, registry
 from conservative.benchmarks.recommendation.recommend import list_engines
 from conservative.benchmarks.studies.engine_selection import list_installed, select_engines
+from conservative.programs import list_programs, user_file
 from conservative.reports.cli.main import main
 
 PROGRAMS = Path(__file__).parent / "programs"
@@ -83,6 +84,14 @@ def test_a_program_describes_its_settings(folder):
         registry.method("p:rk5")
     with pytest.raises(cv.MissingEngine, match="p@3 is not installed"):
         registry.method("p@3")
+
+
+def test_the_program_of_the_project_is_that_of_its_name(folder):
+    """The user has another one of the same name."""
+    user_file().parent.mkdir(parents=True, exist_ok=True)
+    for file, words in ((user_file(), "user"), (folder / "conservative.toml", "project")):
+        file.write_text(f'[engines]\nmine = "{words}"\n')
+    assert list_programs()["mine"].command == "project"
 
 
 UNUSABLE = "its answer to `hello` cannot be used"
