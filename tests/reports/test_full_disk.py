@@ -6,6 +6,7 @@ import pytest
 
 from conservative.benchmarks.gate import baseline, results
 from conservative.benchmarks.gate.results import Row
+from conservative.outcome import OK
 
 from ..environments import run_python
 
@@ -37,7 +38,7 @@ COMMANDS = {
 
 
 def found(*values):
-    rows = {f"id {k}": Row(f"id {k}", "brick_flip", "reduced", "passed", values={"e": value}) for k, value in enumerate(values)}
+    rows = {f"id {k}": Row(f"id {k}", "brick_flip", "reduced", OK, values={"e": value}) for k, value in enumerate(values)}
     return results.Results("a machine", rows, "a commit")
 
 
