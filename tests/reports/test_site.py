@@ -125,7 +125,7 @@ def check_names_and_options(pages):
 def test_links_follow_the_sections_of_a_readme(tmp_path):
     pages = {"a/README.md": {"a/one": "# One\n\n## Deep\n", "a/two": "# Two\n"}}
     text = "[x](#one) [y](README.md#deep) [z](README.md) `[y](#none)` [w](https://example.org)\n\n    [code](#two)\n"
-    assert site.linked("a/two", "a/README.md", text, pages, tmp_path) == (
+    assert site.redirect_links("a/two", "a/README.md", text, pages, tmp_path) == (
         "[x](one.md) [y](one.md#deep) [z](one.md) `[y](#none)` [w](https://example.org)\n\n    [code](#two)\n"
     )
 
