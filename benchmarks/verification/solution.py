@@ -23,7 +23,7 @@ from conservative.scene import Scene
 States = tuple[Array | None, Array | None]
 """Attitudes (n, 3, 3), body to world, and rates (n, 3), rad/s, body axes; None if the file has none."""
 NODES, ANGLE, SWEEPS = 32, 2.0, 60
-"""Of a stretch: Chebyshev points, first length in rad, and largest number of Picard's iterations."""
+"""Chebyshev points of a stretch, the length of the first one in rad, and the largest number of Picard's iterations."""
 SMALLEST, TAIL = 1e-6, 3e-15
 """Shortest stretch that is halved again, relative to the first one, and largest last coefficients of a good stretch."""
 _EPS = 2.0**-52
