@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 import conservative as cv
+from conservative import kernels as all_kernels
 from conservative.deferred_imports import kernels
 from conservative.kernels import digest
 from conservative.kernels.protocol import Result, Workspace
@@ -202,6 +203,16 @@ def test_a_kernel_takes_loose_values_by_the_fields_of_its_tuples(name: str, monk
     for wrong in (loose[:-1], [*loose, 0]):
         with pytest.raises(TypeError, match="Workspace"):
             plain_enter(module)(*wrong)
+
+
+def test_a_process_that_is_stopped_is_not_waited_for_without_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The file of the other process stays: it still has its lock."""
+    place = tmp_path / "lock"
+    monkeypatch.setattr(all_kernels, "lock", lambda path: None)
+    monkeypatch.setattr(all_kernels, "PATIENCE", 0.0)
+    with all_kernels._alone(place):
+        pass
+    assert place.exists()
 
 
 @pytest.mark.slow
