@@ -166,7 +166,7 @@ class Equations:
                     if not np.isfinite(Y).all():
                         break
                 made.ends.append(b)
-                made.series.append(series)
+                made.series.append(np.moveaxis(series, 0, -1))
                 y, a = Y[..., -1], b
                 y[:4] /= np.sqrt((y[:4] * y[:4]).sum(axis=0))
                 before = breaks.pop(0) if a == after else before
@@ -185,7 +185,7 @@ class Equations:
 
 @dataclass(frozen=True, eq=False)
 class Flow:
-    """A motion as Chebyshev series (7, B, NODES) between `ends`, s, from the states `first` (7, B) on."""
+    """A motion as Chebyshev series (B, NODES, 7) between `ends`, s, from the states `first` (7, B) on."""
 
     equations: Equations
     ends: list[float]
@@ -202,7 +202,7 @@ class Flow:
 
     def _sample(self, t: Array, bodies: int) -> tuple[Array, Array]:
         R, w = np.empty((bodies, t.shape[1], 3, 3)), np.empty((bodies, t.shape[1], 3))
-        series = np.array(self.series).reshape(-1, *self.first.shape, NODES)
+        series = np.array(self.series).reshape(-1, self.first.shape[1], NODES, 7)
         wheel = np.empty((0, 0, 3))
         if self.equations.scene.body.motor is not None:
             wheel = np.stack([self.equations.wheel(times).T for times in t])

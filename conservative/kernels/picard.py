@@ -198,13 +198,13 @@ def sweep(field, terms, loads, y, Y, half, tolerance, integral, most):  # noqa: 
 
 @entry
 def sample(ends, series, first, t, wheel, R, w):
-    """Write attitudes (B, n, 3, 3) and rates (B, n, 3) of Chebyshev series (stretches, 7, B, terms) between `ends`.
+    """Write attitudes (B, n, 3, 3) and rates (B, n, 3) of Chebyshev series (stretches, B, terms, 7) between `ends`.
 
     Times t (B or 1, n) may be in any order. States are nan outside of the series, and `first` (7, B) at the start. `wheel`
     (B or 1, n, 3) is subtracted from the rates; it may have length 0.
     """
-    stretches, bodies, terms = series.shape[0], first.shape[1], series.shape[3]
-    y = np.empty(7)
+    stretches, bodies, terms = series.shape[0], first.shape[1], series.shape[2]
+    y, two = np.empty(7), np.empty(7)
     for b in range(R.shape[0]):
         own, of = b if bodies > 1 else 0, b if t.shape[0] > 1 else 0
         place = 0
@@ -222,11 +222,12 @@ def sample(ends, series, first, t, wheel, R, w):
                     place += 1
                 a, c = ends[place], ends[place + 1]
                 x = 2.0 * ((time - a) / (c - a)) - 1.0
-                for i in range(7):  # Clenshaw's recurrence
-                    one, two = 0.0, 0.0
-                    for j in range(terms - 1, 0, -1):
-                        one, two = series[place, i, own, j] + 2.0 * x * one - two, one
-                    y[i] = series[place, i, own, 0] + x * one - two
+                y[:], two[:] = 0.0, 0.0
+                for j in range(terms - 1, 0, -1):  # Clenshaw's recurrence
+                    for i in range(7):
+                        y[i], two[i] = series[place, own, j, i] + 2.0 * x * y[i] - two[i], y[i]
+                for i in range(7):
+                    y[i] = series[place, own, 0, i] + x * y[i] - two[i]
             _matrix(y, R[b, k])
             for i in range(3):
                 w[b, k, i] = y[4 + i] - (wheel[of, k, i] if len(wheel) else 0.0)
