@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -108,7 +108,7 @@ class Equations:
         mode, tensor = picard.HALF_TURNED if self.half_turned else picard.USUAL, J
         if self.fixed is not None:
             mode, tensor = picard.FIXED, np.ascontiguousarray(self.fixed)
-            inverse = np.linalg.inv(tensor)
+            inverse = np.linalg.inv(tensor).astype(float)
         spinning, side = J if self.spinning is None else np.ascontiguousarray(self.spinning), -1.0 if self.left else 1.0
         factors = np.empty((bodies, 4))
         for i, factor in enumerate((self.gyroscopic, self.field, self.damping, self.turn)):
@@ -217,10 +217,13 @@ class Derivative:
     equations: Equations
     loads: picard.AtTimes
     own: list[Torque]
+    terms: dict[int, picard.Terms] = field(default_factory=dict)
 
     def __call__(self, y: Array) -> Array:
         out, y = np.empty(y.shape), np.ascontiguousarray(y)
-        picard.slopes(self.equations.law, self.equations.terms(y.shape[1]), self._with_own(y), y, out)
+        if y.shape[1] not in self.terms:
+            self.terms[y.shape[1]] = self.equations.terms(y.shape[1])
+        picard.slopes(self.equations.law, self.terms[y.shape[1]], self._with_own(y), y, out)
         return out
 
     def sweep(self, y: Array, half: float, tolerance: float) -> tuple[Array, int]:
