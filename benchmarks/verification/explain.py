@@ -18,7 +18,7 @@ from .compare import LINEAR, LONGEST, NUMERICAL, Compared, Effort, Solution, exa
 from .explanation import HALF, PROVEN, Explanation, Trial, attempt, explain
 from .find_steps import PARTS, STEPS_AT_MOST, find_steps
 from .mistakes import BY_KEY
-from .mistakes.attitudes import RULES, align, integrate
+from .mistakes.attitudes import DRIFTS, RULES, align, integrate
 from .mistakes.equations import EQUATIONS
 from .mistakes.habits import HABITS, ROWS, STANDSTILLS, Standstill
 from .mistakes.mistake import Number
@@ -28,7 +28,7 @@ from .mistakes.scenes import SCENES, SceneMistake, with_inertia
 from .mistakes.steps import INTEGRATORS
 from .mistakes.times import DROPPED, JITTERED, TIMES
 from .solution import Equations, has_closed_form, truth
-from .trials import by_habit, by_rule, compose, fits, remark_on_damping
+from .trials import Drifting, by_drift, by_habit, by_rule, compose, fits, remark_on_damping
 
 FEWEST, MOST = 100, 2500
 """Rows that are explained: at least `FEWEST`, if the file has them, and at most `MOST`, evenly chosen."""
@@ -44,6 +44,8 @@ SHRUNK = 1e-3
 """A motion in other units of time that moves by less than this share of the exact motion stands still."""
 SHOWN = 10.0
 """A motion in other units of time that moves by less than this number of allowed errors shows nothing."""
+DRIFTING_ROWS, DRIFTING_EFFORT, MOST_FITS = 300, 30, 20
+"""Rows from which a drift is fitted, the work of a fit, and the largest number of its iterations."""
 _INERTIA = [f"inertia_{ij}" for ij in (11, 12, 13, 22, 23, 33)]
 ALL_KINDS = frozenset({"readings", "times", "scenes", "equations", "attitudes", "habits", "rows", "steps", "bodies"})
 PROGRAM_KINDS = frozenset({"readings", "times", "scenes", "equations", "attitudes", "habits"})
@@ -347,9 +349,7 @@ def _attitudes(case: Compared, asked: _Asked) -> Explanations:
             for rule in RULES:
                 yield attempt(case, by_rule(rule, 1), known={"step": case.step})
         return
-    alone = replace(case, data=(None, w), free=case.free[3:])
-    if alone.free:  # the integral collects what the first row is off
-        case = replace(case, scene=alone.at(alone.fit(exact(alone), np.zeros(0), np.zeros(0))[0]).scene)
+    case = _at_fitted_rates(case)
     made = case.exact
     if case.errors(*made)[1].max() > case.allowed[1] or not case.from_row:
         return
@@ -376,6 +376,64 @@ def _attitudes(case: Compared, asked: _Asked) -> Explanations:
             if ratio > 0:
                 wanted += [max(1, round(parts * ratio ** (-1 / order))) for order in (1, 2)]
         yield min(explanations, key=lambda explanation: explanation.share)
+
+
+def _at_fitted_rates(case: Compared) -> Compared:
+    """Return the case whose initial state fits the rates of all rows, because the integral collects the noise of the first row.
+
+    Without a field and loads, rates do not depend on the attitude.
+    """
+    alone = replace(case, data=(None, case.data[1]), free=case.free[3:] if case.scene.free else case.free)
+    if not alone.free:
+        return case
+    return replace(case, scene=alone.at(alone.fit(exact(alone), np.zeros(0), np.zeros(0))[0]).scene)
+
+
+def _drifts(case: Compared, asked: _Asked) -> Explanations:
+    """Yield attitudes that drift against rates that are right, at a constant rate."""
+    R, w = case.data
+    if R is None or w is None or case.step is not None:
+        return
+    case = _at_fitted_rates(case)
+    if case.errors(*case.exact)[1].max() > case.allowed[1]:
+        return
+    some = case.take(np.unique(np.linspace(0, len(case.t) - 1, DRIFTING_ROWS).astype(int)))
+    start, fitted = (case.scene.R_WB0, case.scene.w_WB_B0), Drifting(some, case.scene.R_WB0, case.scene.w_WB_B0, some.exact[0])
+    whole = Drifting(case, *start, case.exact[0])
+    for drift in DRIFTS:
+        numbers, offset = _fit_drift(fitted, drift)
+        values = dict(zip((number.name for number in drift.numbers), numbers.tolist(), strict=True))
+        yield explain(case, by_drift(drift), (offset @ whole(drift, numbers), case.exact[1]), values)
+
+
+def _fit_drift(drifting: Drifting, drift: Drift) -> tuple[Array, Array]:
+    """Return the numbers of a drift that fit attitudes best, and the turn (3, 3) of the world by which a noisy start is off.
+
+    More and more rows are fitted, because a small error of the rate turns late attitudes by any angle.
+    """
+    case, numbers, offset, small = drifting.case, np.zeros(len(drift.numbers)), np.eye(3), 1e-6 * drifting.case.scale
+    assert case.data[0] is not None
+    case.effort.spend(DRIFTING_EFFORT)
+    for _ in range(MOST_FITS):
+        made = offset @ drifting(drift, numbers)
+        apart = _angles(made, case.data[0])
+        far = np.flatnonzero(np.linalg.norm(apart, axis=1) > 1)
+        near = slice(0, max(int(far[0]), 4) if len(far) else len(apart))
+        moved = [_angles(made, offset @ drifting(drift, numbers + small * e))[near] / small for e in np.eye(len(numbers))]
+        slopes = np.stack([x.ravel() for x in moved], axis=1)
+        if case.free:
+            slopes = np.hstack([slopes, np.swapaxes(made, 1, 2)[near].reshape(-1, 3)])
+        change = np.linalg.lstsq(slopes, apart[near].ravel(), rcond=None)[0]
+        numbers = numbers + change[: len(numbers)]
+        offset = Rotation.from_rotvec(change[len(numbers) :]).as_matrix() @ offset if case.free else offset
+        if near.stop == len(apart) and np.abs(slopes @ change).max() < 1e-14:
+            break
+    return numbers, offset
+
+
+def _angles(first: Array, second: Array) -> Array:
+    """Return the rotation vectors (n, 3) in body axes from attitudes to others."""
+    return Rotation.from_matrix(np.swapaxes(first, 1, 2) @ second).as_rotvec()
 
 
 def _habits(case: Compared, asked: _Asked) -> Explanations:
@@ -747,6 +805,7 @@ SEARCHES = {
     "other times": Search(_times, frozenset({"times"}), 0.1),
     "fitted numbers": Search(_numbers, frozenset({"scenes", "equations"}), 0.15),
     "attitudes from rates": Search(_attitudes, frozenset({"attitudes"}), 0.3, ends=True),
+    "drifting attitudes": Search(_drifts, frozenset({"attitudes"}), 0.1, ends=True),
     "integrators": Search(_steps, frozenset({"steps"}), 0.25, ends=True),
     "several mistakes": Search(_several, frozenset({"readings", "times", "scenes", "equations"}), 0.1, ends=True),
     "other axes": Search(_turned_axes, frozenset({"readings"}), 0.1),
