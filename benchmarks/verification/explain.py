@@ -12,7 +12,7 @@ import numpy as np
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from conservative.attitude import Array, to_quaternion
+from conservative.attitude import Array, angle_between, to_quaternion
 
 from .compare import LINEAR, LONGEST, NUMERICAL, Compared, Effort, Solution, exact
 from .explanation import HALF, PROVEN, Explanation, Trial, attempt, explain
@@ -119,6 +119,8 @@ def diagnose(
     fewest = min((explanation.numbers, len(explanation.keys)) for explanation in good)
     good = [explanation for explanation in good if (explanation.numbers, len(explanation.keys)) == fewest]
     named = [explanation for explanation in good if _normalised(explanation)] or good
+    if case.step is None:
+        named = [explanation.with_intervals(case) for explanation in named]
     return Diagnosis(named, tried, _separate(case, named))
 
 
@@ -368,7 +370,8 @@ def _attitudes(case: Compared, asked: _Asked) -> Explanations:
             small = np.linalg.norm(gone, axis=(1, 2)) < LINEAR
             ratio = float((error * gone)[small].sum() / ((error * error)[small].sum() or 1.0)) if small.sum() > 2 else 1.0
             if case.free:  # the first attitude has noise too
-                turned = align(turned, R, rule.world)
+                aligned = align(turned, R, rule.world)
+                turned = aligned if angle_between(aligned[0], turned[0]) <= case.allowed[0] else turned
             step = float(np.median(np.diff(case.t))) / parts
             explanations.append(explain(case, by_rule(rule, parts), (turned, made[1]), {"step": step}))
             if explanations[-1].explains:
@@ -381,12 +384,15 @@ def _attitudes(case: Compared, asked: _Asked) -> Explanations:
 def _at_fitted_rates(case: Compared) -> Compared:
     """Return the case whose initial state fits the rates of all rows, because the integral collects the noise of the first row.
 
-    Without a field and loads, rates do not depend on the attitude.
+    Without a field and loads, rates do not depend on the attitude. An attitude that differs by more than the noise is not one.
     """
     alone = replace(case, data=(None, case.data[1]), free=case.free[3:] if case.scene.free else case.free)
     if not alone.free:
         return case
-    return replace(case, scene=alone.at(alone.fit(exact(alone), np.zeros(0), np.zeros(0))[0]).scene)
+    initial = alone.fit(exact(alone), np.zeros(0), np.zeros(0))[0]
+    if np.linalg.norm(initial[:3]) > case.allowed[0]:
+        initial = replace(alone, free=case.free[3:]).fit(exact(alone), np.zeros(0), np.zeros(0))[0]
+    return replace(case, scene=alone.at(initial).scene)
 
 
 def _drifts(case: Compared, asked: _Asked) -> Explanations:
@@ -428,7 +434,7 @@ def _fit_drift(drifting: Drifting, drift: Drift) -> tuple[Array, Array]:
         offset = Rotation.from_rotvec(change[len(numbers) :]).as_matrix() @ offset if case.free else offset
         if near.stop == len(apart) and np.abs(slopes @ change).max() < 1e-14:
             break
-    return numbers, offset
+    return numbers, offset if angle_between(offset, np.eye(3)) <= case.allowed[0] else np.eye(3)
 
 
 def _angles(first: Array, second: Array) -> Array:
@@ -572,32 +578,42 @@ def _off_rows(error: Array) -> Any:
     return off if 0 < off.sum() <= 0.1 * n else None
 
 
+def _sensors(case: Compared, asked: _Asked) -> Explanations:
+    """Yield rates and attitudes in axes that are turned against each other, and rates of another size or with a bias."""
+    R, w = case.data
+    if R is None or w is None or len(case.scene.breaks) > MOST_BREAKS:
+        return
+    turns = Rotation.from_matrix(np.swapaxes(R[:-1], 1, 2) @ R[1:]).as_rotvec() / np.diff(case.t)[:, None]
+    w = (w[1:] + w[:-1]) / 2
+    for key, sign, of in (("rates in turned axes", 1.0, 1), ("rates in mirrored axes", -1.0, 1), ("turned attitudes", 1.0, 0)):
+        U, _, V = np.linalg.svd((sign * w).T @ turns)  # sign w = C' turns
+        C = V.T @ np.diag([1, 1, np.linalg.det(U @ V)]) @ U.T
+        turn = Rotation.from_matrix(C if of else C.T).as_rotvec()
+        best = attempt(case, compose(BY_KEY[key]), turn.tolist(), most=20)
+        yield best and _shortest_turn(best)
+    yield attempt(case, compose(BY_KEY["bias of the rates"]), (w - turns).mean(axis=0).tolist(), most=20)
+    size = float((w * turns).sum() / ((turns * turns).sum() or 1.0))
+    yield attempt(case, compose(BY_KEY["size of the rates"]), [size], most=20) if abs(size) > 1e-3 else None
+
+
 def _turned_axes(case: Compared, asked: _Asked) -> Explanations:
-    """Yield rates in turned or mirrored axes, and turned body axes, from the best of 24 directions."""
+    """Yield turned axes of the world or of the body, from the best of 24 directions."""
     if len(case.scene.breaks) > MOST_BREAKS:
         return
-    R, w = case.data
-    if R is not None and w is not None:
-        right = case.exact[1]
-        if case.from_row:  # the rates that the attitudes have
-            turns = Rotation.from_matrix(np.swapaxes(R[:-1], 1, 2) @ R[1:]).as_rotvec() / np.diff(case.t)[:, None]
-            right, w = turns, (w[1:] + w[:-1]) / 2
-        for key, sign in (("rates in turned axes", 1.0), ("rates in mirrored axes", -1.0)):
-            U, _, V = np.linalg.svd((sign * w).T @ right)  # sign w = C' right
-            C = V.T @ np.diag([1, 1, np.linalg.det(U @ V)]) @ U.T
-            best = attempt(case, compose(BY_KEY[key]), Rotation.from_matrix(C).as_rotvec().tolist(), most=20)
-            yield best and _shortest_turn(best)
-        yield attempt(case, compose(BY_KEY["bias of the rates"]), (w - right).mean(axis=0).tolist(), most=20)
-        size = float((w * right).sum() / ((right * right).sum() or 1.0))
-        yield attempt(case, compose(BY_KEY["size of the rates"]), [size], most=20) if abs(size) > 1e-3 else None
-    trial, near, turns = compose(BY_KEY["body axes"]), case.first(3.0, 10), Rotation.create_group("O").as_rotvec()
+    if case.data[0] is not None and not (case.from_row and case.scene.free):  # it moves equally in any axes of the world
+        yield _best_turn(case, compose(BY_KEY["turned world"]))
+    yield _best_turn(case, compose(BY_KEY["body axes"]))
+
+
+def _best_turn(case: Compared, trial: Trial) -> Explanation:
+    near, turns = case.first(3.0, 10), Rotation.create_group("O").as_rotvec()
     motion = trial.build(near)
     assert motion is not None
     many = np.broadcast_to(case.scene.R_WB0, (24, 3, 3)), np.broadcast_to(case.scene.w_WB_B0, (24, 3))
     left = np.linalg.norm(near.differences(*motion(*many, turns, len(near.t))), axis=(1, 2))
     explanations = [attempt(case, trial, turns[k].tolist(), most=30) for k in np.argsort(left, kind="stable")[:3]]
     shortest = [_shortest_turn(explanation) for explanation in explanations if explanation is not None]
-    yield min(shortest, key=lambda explanation: (round(explanation.share, 3), np.linalg.norm([*explanation.values.values()])))
+    return min(shortest, key=lambda explanation: (round(explanation.share, 3), np.linalg.norm([*explanation.values.values()])))
 
 
 def _shortest_turn(explanation: Explanation) -> Explanation:
@@ -800,6 +816,7 @@ SEARCHES = {
     "units of time": Search(_units, frozenset({"times"}), 0.05, ends=True, whole=True, least=1),
     "other equations": Search(_changes, frozenset({"scenes", "equations"}), 0.3),
     "other readings": Search(_readings, frozenset({"readings"}), 0.1, ends=True),
+    "axes and sizes of rates": Search(_sensors, frozenset({"readings"}), 0.1),
     "habits": Search(_habits, frozenset({"habits"}), 0.1, least=1),
     "wrong rows": Search(_rows, frozenset({"rows"}), 0.01, ends=True),
     "other times": Search(_times, frozenset({"times"}), 0.1),
