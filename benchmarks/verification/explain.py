@@ -12,14 +12,14 @@ import numpy as np
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from conservative.attitude import Array, to_quaternion
+from conservative.attitude import Array, angle_between, to_quaternion
 from conservative.scene import Scene
 
 from .compare import LINEAR, LONGEST, NUMERICAL, Compared, Effort, Solution, differ, exact, linearise
 from .explanation import HALF, PROVEN, Explanation, Trial, attempt, explain
 from .find_steps import PARTS, STEPS_AT_MOST, Linearised, by_step, find_steps
 from .mistakes import BY_KEY
-from .mistakes.attitudes import RULES, align, integrate
+from .mistakes.attitudes import DRIFTS, RULES, Drift, align, integrate
 from .mistakes.equations import EQUATIONS
 from .mistakes.habits import HABITS, ROWS, STANDSTILLS, Standstill
 from .mistakes.mistake import Number
@@ -29,7 +29,7 @@ from .mistakes.scenes import SCENES, SIZES, SceneMistake, with_inertia
 from .mistakes.steps import INTEGRATORS
 from .mistakes.times import DROPPED, JITTERED, TIMES
 from .solution import Equations, has_closed_form, truth
-from .trials import by_habit, by_rule, compose, fits, remark_on_damping
+from .trials import Drifting, by_drift, by_habit, by_rule, compose, fits, remark_on_damping
 
 FEWEST, MOST = 100, 2500
 """Rows that are explained: at least `FEWEST`, if the file has them, and at most `MOST`, evenly chosen."""
@@ -48,6 +48,8 @@ SHOWN = 10.0
 NEARLY, SMALL_SHARE, REFINED = 1e-2, 1e-6, 2
 """Largest share of the error that an integrator leaves if sizes of numbers of the scene are fitted to the rest, the change of a
 number for slopes, and the number of such fits."""
+DRIFTING_ROWS, DRIFTING_EFFORT, MOST_FITS = 300, 30, 20
+"""Rows from which a drift is fitted, the work of a fit, and the largest number of its iterations."""
 _INERTIA = [f"inertia_{ij}" for ij in (11, 12, 13, 22, 23, 33)]
 ALL_KINDS = frozenset({"readings", "times", "scenes", "equations", "attitudes", "habits", "rows", "steps", "bodies"})
 PROGRAM_KINDS = frozenset({"readings", "times", "scenes", "equations", "attitudes", "habits"})
@@ -121,6 +123,8 @@ def diagnose(
     fewest = min((explanation.numbers, len(explanation.keys)) for explanation in good)
     good = [explanation for explanation in good if (explanation.numbers, len(explanation.keys)) == fewest]
     named = [explanation for explanation in good if _normalised(explanation)] or good
+    if case.step is None:
+        named = [explanation.with_intervals(case) for explanation in named]
     return Diagnosis(named, tried, _separate(case, named))
 
 
@@ -359,9 +363,7 @@ def _attitudes(case: Compared, asked: _Asked) -> Explanations:
             for rule in RULES:
                 yield attempt(case, by_rule(rule, 1), known={"step": case.step})
         return
-    alone = replace(case, data=(None, w), free=case.free[3:])
-    if alone.free:  # the integral collects what the first row is off
-        case = replace(case, scene=alone.at(alone.fit(exact(alone), np.zeros(0), np.zeros(0))[0]).scene)
+    case = _at_fitted_rates(case)
     made = case.exact
     if case.errors(*made)[1].max() > case.allowed[1] or not case.from_row:
         return
@@ -380,7 +382,8 @@ def _attitudes(case: Compared, asked: _Asked) -> Explanations:
             small = np.linalg.norm(gone, axis=(1, 2)) < LINEAR
             ratio = float((error * gone)[small].sum() / ((error * error)[small].sum() or 1.0)) if small.sum() > 2 else 1.0
             if case.free:  # the first attitude has noise too
-                turned = align(turned, R, rule.world)
+                aligned = align(turned, R, rule.world)
+                turned = aligned if angle_between(aligned[0], turned[0]) <= case.allowed[0] else turned
             step = float(np.median(np.diff(case.t))) / parts
             explanations.append(explain(case, by_rule(rule, parts), (turned, made[1]), {"step": step}))
             if explanations[-1].explains:
@@ -388,6 +391,67 @@ def _attitudes(case: Compared, asked: _Asked) -> Explanations:
             if ratio > 0:
                 wanted += [max(1, round(parts * ratio ** (-1 / order))) for order in (1, 2)]
         yield min(explanations, key=lambda explanation: explanation.share)
+
+
+def _at_fitted_rates(case: Compared) -> Compared:
+    """Return the case whose initial state fits the rates of all rows, because the integral collects the noise of the first row.
+
+    Without a field and loads, rates do not depend on the attitude. An attitude that differs by more than the noise is not one.
+    """
+    alone = replace(case, data=(None, case.data[1]), free=case.free[3:] if case.scene.free else case.free)
+    if not alone.free:
+        return case
+    initial = alone.fit(exact(alone), np.zeros(0), np.zeros(0))[0]
+    if np.linalg.norm(initial[:3]) > case.allowed[0]:
+        initial = replace(alone, free=case.free[3:]).fit(exact(alone), np.zeros(0), np.zeros(0))[0]
+    return replace(case, scene=alone.at(initial).scene)
+
+
+def _drifts(case: Compared, asked: _Asked) -> Explanations:
+    """Yield attitudes that drift against rates that are right, at a constant rate."""
+    R, w = case.data
+    if R is None or w is None or case.step is not None:
+        return
+    case = _at_fitted_rates(case)
+    if case.errors(*case.exact)[1].max() > case.allowed[1]:
+        return
+    some = case.take(np.unique(np.linspace(0, len(case.t) - 1, DRIFTING_ROWS).astype(int)))
+    start, fitted = (case.scene.R_WB0, case.scene.w_WB_B0), Drifting(some, case.scene.R_WB0, case.scene.w_WB_B0, some.exact[0])
+    whole = Drifting(case, *start, case.exact[0])
+    for drift in DRIFTS:
+        numbers, offset = _fit_drift(fitted, drift)
+        values = dict(zip((number.name for number in drift.numbers), numbers.tolist(), strict=True))
+        yield explain(case, by_drift(drift), (offset @ whole(drift, numbers), case.exact[1]), values)
+
+
+def _fit_drift(drifting: Drifting, drift: Drift) -> tuple[Array, Array]:
+    """Return the numbers of a drift that fit attitudes best, and the turn (3, 3) of the world by which a noisy start is off.
+
+    More and more rows are fitted, because a small error of the rate turns late attitudes by any angle.
+    """
+    case, numbers, offset, small = drifting.case, np.zeros(len(drift.numbers)), np.eye(3), 1e-6 * drifting.case.scale
+    assert case.data[0] is not None
+    case.effort.spend(DRIFTING_EFFORT)
+    for _ in range(MOST_FITS):
+        made = offset @ drifting(drift, numbers)
+        apart = _angles(made, case.data[0])
+        far = np.flatnonzero(np.linalg.norm(apart, axis=1) > 1)
+        near = slice(0, max(int(far[0]), 4) if len(far) else len(apart))
+        moved = [_angles(made, offset @ drifting(drift, numbers + small * e))[near] / small for e in np.eye(len(numbers))]
+        slopes = np.stack([x.ravel() for x in moved], axis=1)
+        if case.free:
+            slopes = np.hstack([slopes, np.swapaxes(made, 1, 2)[near].reshape(-1, 3)])
+        change = np.linalg.lstsq(slopes, apart[near].ravel(), rcond=None)[0]
+        numbers = numbers + change[: len(numbers)]
+        offset = Rotation.from_rotvec(change[len(numbers) :]).as_matrix() @ offset if case.free else offset
+        if near.stop == len(apart) and np.abs(slopes @ change).max() < 1e-14:
+            break
+    return numbers, offset if angle_between(offset, np.eye(3)) <= case.allowed[0] else np.eye(3)
+
+
+def _angles(first: Array, second: Array) -> Array:
+    """Return the rotation vectors (n, 3) in body axes from attitudes to others."""
+    return Rotation.from_matrix(np.swapaxes(first, 1, 2) @ second).as_rotvec()
 
 
 def _habits(case: Compared, asked: _Asked) -> Explanations:
@@ -526,32 +590,42 @@ def _off_rows(error: Array) -> Any:
     return off if 0 < off.sum() <= 0.1 * n else None
 
 
+def _sensors(case: Compared, asked: _Asked) -> Explanations:
+    """Yield rates and attitudes in axes that are turned against each other, and rates of another size or with a bias."""
+    R, w = case.data
+    if R is None or w is None or len(case.scene.breaks) > MOST_BREAKS:
+        return
+    turns = Rotation.from_matrix(np.swapaxes(R[:-1], 1, 2) @ R[1:]).as_rotvec() / np.diff(case.t)[:, None]
+    w = (w[1:] + w[:-1]) / 2
+    for key, sign, of in (("rates in turned axes", 1.0, 1), ("rates in mirrored axes", -1.0, 1), ("turned attitudes", 1.0, 0)):
+        U, _, V = np.linalg.svd((sign * w).T @ turns)  # sign w = C' turns
+        C = V.T @ np.diag([1, 1, np.linalg.det(U @ V)]) @ U.T
+        turn = Rotation.from_matrix(C if of else C.T).as_rotvec()
+        best = attempt(case, compose(BY_KEY[key]), turn.tolist(), most=20)
+        yield best and _shortest_turn(best)
+    yield attempt(case, compose(BY_KEY["bias of the rates"]), (w - turns).mean(axis=0).tolist(), most=20)
+    size = float((w * turns).sum() / ((turns * turns).sum() or 1.0))
+    yield attempt(case, compose(BY_KEY["size of the rates"]), [size], most=20) if abs(size) > 1e-3 else None
+
+
 def _turned_axes(case: Compared, asked: _Asked) -> Explanations:
-    """Yield rates in turned or mirrored axes, and turned body axes, from the best of 24 directions."""
+    """Yield turned axes of the world or of the body, from the best of 24 directions."""
     if len(case.scene.breaks) > MOST_BREAKS:
         return
-    R, w = case.data
-    if R is not None and w is not None:
-        right = case.exact[1]
-        if case.from_row:  # the rates that the attitudes have
-            turns = Rotation.from_matrix(np.swapaxes(R[:-1], 1, 2) @ R[1:]).as_rotvec() / np.diff(case.t)[:, None]
-            right, w = turns, (w[1:] + w[:-1]) / 2
-        for key, sign in (("rates in turned axes", 1.0), ("rates in mirrored axes", -1.0)):
-            U, _, V = np.linalg.svd((sign * w).T @ right)  # sign w = C' right
-            C = V.T @ np.diag([1, 1, np.linalg.det(U @ V)]) @ U.T
-            best = attempt(case, compose(BY_KEY[key]), Rotation.from_matrix(C).as_rotvec().tolist(), most=20)
-            yield best and _shortest_turn(best)
-        yield attempt(case, compose(BY_KEY["bias of the rates"]), (w - right).mean(axis=0).tolist(), most=20)
-        size = float((w * right).sum() / ((right * right).sum() or 1.0))
-        yield attempt(case, compose(BY_KEY["size of the rates"]), [size], most=20) if abs(size) > 1e-3 else None
-    trial, near, turns = compose(BY_KEY["body axes"]), case.first(3.0, 10), Rotation.create_group("O").as_rotvec()
+    if case.data[0] is not None and not (case.from_row and case.scene.free):  # it moves equally in any axes of the world
+        yield _best_turn(case, compose(BY_KEY["turned world"]))
+    yield _best_turn(case, compose(BY_KEY["body axes"]))
+
+
+def _best_turn(case: Compared, trial: Trial) -> Explanation:
+    near, turns = case.first(3.0, 10), Rotation.create_group("O").as_rotvec()
     motion = trial.build(near)
     assert motion is not None
     many = np.broadcast_to(case.scene.R_WB0, (24, 3, 3)), np.broadcast_to(case.scene.w_WB_B0, (24, 3))
     left = np.linalg.norm(near.differences(*motion(*many, turns, len(near.t))), axis=(1, 2))
     explanations = [attempt(case, trial, turns[k].tolist(), most=30) for k in np.argsort(left, kind="stable")[:3]]
     shortest = [_shortest_turn(explanation) for explanation in explanations if explanation is not None]
-    yield min(shortest, key=lambda explanation: (round(explanation.share, 3), np.linalg.norm([*explanation.values.values()])))
+    return min(shortest, key=lambda explanation: (round(explanation.share, 3), np.linalg.norm([*explanation.values.values()])))
 
 
 def _shortest_turn(explanation: Explanation) -> Explanation:
@@ -846,11 +920,13 @@ SEARCHES = {
     "units of time": Search(_units, frozenset({"times"}), 0.05, ends=True, whole=True, least=1),
     "other equations": Search(_changes, frozenset({"scenes", "equations"}), 0.3),
     "other readings": Search(_readings, frozenset({"readings"}), 0.1, ends=True),
+    "axes and sizes of rates": Search(_sensors, frozenset({"readings"}), 0.1),
     "habits": Search(_habits, frozenset({"habits"}), 0.1, least=1),
     "wrong rows": Search(_rows, frozenset({"rows"}), 0.01, ends=True),
     "other times": Search(_times, frozenset({"times"}), 0.1),
     "fitted numbers": Search(_numbers, frozenset({"scenes", "equations"}), 0.15),
     "attitudes from rates": Search(_attitudes, frozenset({"attitudes"}), 0.3, ends=True),
+    "drifting attitudes": Search(_drifts, frozenset({"attitudes"}), 0.1, ends=True),
     "integrators": Search(_steps, frozenset({"steps"}), 0.25, ends=True),
     "several mistakes": Search(_several, frozenset({"readings", "times", "scenes", "equations"}), 0.1, ends=True),
     "other axes": Search(_turned_axes, frozenset({"readings"}), 0.1),
