@@ -617,7 +617,7 @@ def _turned_axes(case: Compared, asked: _Asked) -> Explanations:
     yield _best_turn(case, compose(BY_KEY["body axes"]))
 
 
-def _best_turn(case: Compared, trial: Trial) -> Explanation:
+def _best_turn(case: Compared, trial: Trial) -> Explanation | None:
     near, turns = case.first(3.0, 10), Rotation.create_group("O").as_rotvec()
     motion = trial.build(near)
     assert motion is not None
@@ -625,7 +625,11 @@ def _best_turn(case: Compared, trial: Trial) -> Explanation:
     left = np.linalg.norm(near.differences(*motion(*many, turns, len(near.t))), axis=(1, 2))
     explanations = [attempt(case, trial, turns[k].tolist(), most=30) for k in np.argsort(left, kind="stable")[:3]]
     shortest = [_shortest_turn(explanation) for explanation in explanations if explanation is not None]
-    return min(shortest, key=lambda explanation: (round(explanation.share, 3), np.linalg.norm([*explanation.values.values()])))
+    return min(
+        shortest,
+        key=lambda explanation: (round(explanation.share, 3), np.linalg.norm([*explanation.values.values()])),
+        default=None,
+    )
 
 
 def _shortest_turn(explanation: Explanation) -> Explanation:
@@ -920,10 +924,10 @@ SEARCHES = {
     "units of time": Search(_units, frozenset({"times"}), 0.05, ends=True, whole=True, least=1),
     "other equations": Search(_changes, frozenset({"scenes", "equations"}), 0.3),
     "other readings": Search(_readings, frozenset({"readings"}), 0.1, ends=True),
-    "axes and sizes of rates": Search(_sensors, frozenset({"readings"}), 0.1),
     "habits": Search(_habits, frozenset({"habits"}), 0.1, least=1),
     "wrong rows": Search(_rows, frozenset({"rows"}), 0.01, ends=True),
     "other times": Search(_times, frozenset({"times"}), 0.1),
+    "axes and sizes of rates": Search(_sensors, frozenset({"readings"}), 0.1),
     "fitted numbers": Search(_numbers, frozenset({"scenes", "equations"}), 0.15),
     "attitudes from rates": Search(_attitudes, frozenset({"attitudes"}), 0.3, ends=True),
     "drifting attitudes": Search(_drifts, frozenset({"attitudes"}), 0.1, ends=True),
