@@ -28,7 +28,7 @@ from .mistakes.scenes import PARTS as SCENE_PARTS
 from .mistakes.scenes import SCENES, SIZES, SceneMistake, with_inertia
 from .mistakes.steps import INTEGRATORS
 from .mistakes.times import DROPPED, JITTERED, TIMES
-from .solution import Equations, has_closed_form, truth
+from .solution import Equations, has_closed_form, integrate_rates, truth
 from .trials import Drifting, by_drift, by_habit, by_rule, compose, fits, remark_on_damping
 
 FEWEST, MOST = 100, 2500
@@ -147,7 +147,8 @@ def _separate(case: Compared, named: list[Explanation]) -> list[str]:
     """Return a note on the data that would separate several mistakes that explain a file."""
     motions = [explanation.made for explanation in named if explanation.made is not None]
     for kind, i, size, unit in (("attitudes", 0, 1.0, "rad"), ("rates", 1, case.scale, "of the largest rate")):
-        apart = max((float(np.abs(a[i] - b[i]).max()) / size for a, b in combinations(motions, 2)), default=0.0)
+        pairs = ((a[i], b[i]) for a, b in combinations(motions, 2) if len(a[i]) == len(b[i]))
+        apart = max((float(np.abs(a - b).max()) / size for a, b in pairs), default=0.0)
         if case.data[i] is None and apart > 2 * case.allowed[i]:
             return [f"Columns of {kind} would separate these: they differ by up to {apart:.2g} {unit}."]
     return ["They make the same rows. A longer file or more digits may separate them."] * (len(named) > 1)
@@ -367,6 +368,7 @@ def _attitudes(case: Compared, asked: _Asked) -> Explanations:
     made = case.exact
     if case.errors(*made)[1].max() > case.allowed[1] or not case.from_row:
         return
+    limits = {False: made[0], True: _on_the_wrong_side(case)}  # of short steps
     for rule in RULES:
         wanted, seen, explanations = [case.stride, 1], set[int](), list[Explanation]()
         while wanted and len(seen) < 8:  # each try is nearer to the best number of steps, so a few are enough
@@ -378,7 +380,7 @@ def _attitudes(case: Compared, asked: _Asked) -> Explanations:
             fine = np.append((case.t[:-1, None] + np.diff(case.t)[:, None] * np.arange(parts) / parts).ravel(), case.t[-1])
             rates = truth(case.scene, case.start, fine)[1] if parts > 1 else made[1]
             turned = integrate(rule.matrices, case.scene.R_WB0, rates, np.diff(fine), parts)
-            error, gone = turned - made[0], R - made[0]
+            error, gone = turned - limits[rule.world], R - limits[rule.world]
             small = np.linalg.norm(gone, axis=(1, 2)) < LINEAR
             ratio = float((error * gone)[small].sum() / ((error * error)[small].sum() or 1.0)) if small.sum() > 2 else 1.0
             if case.free:  # the first attitude has noise too
@@ -391,6 +393,15 @@ def _attitudes(case: Compared, asked: _Asked) -> Explanations:
             if ratio > 0:
                 wanted += [max(1, round(parts * ratio ** (-1 / order))) for order in (1, 2)]
         yield min(explanations, key=lambda explanation: explanation.share)
+
+
+def _on_the_wrong_side(case: Compared) -> Array:
+    """Return the attitudes (n, 3, 3) whose quaternions are q' = w q / 2 with the exact rates, in body axes."""
+    start, end = case.scene.R_WB0, float(case.t[-1])
+    flow = Equations(case.scene).flow(case.start, start[None], case.scene.w_WB_B0[None], end)
+    # The conjugate obeys p' = p (-w) / 2.
+    turned = integrate_rates(lambda t: -flow.at(t.ravel())[1].reshape(*t.shape, 3), np.array(flow.ends), case.t)
+    return np.swapaxes(turned, 1, 2) @ start
 
 
 def _at_fitted_rates(case: Compared) -> Compared:
