@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import conservative as cv
 from conservative.benchmarks.verification.recordings.comparison import prepare
 from conservative.benchmarks.verification.recordings.table import Options, read
 from conservative.errors import BadInput
@@ -52,7 +53,7 @@ READ = {
     "a temperature temp": {"t": T, "temp": 20 + ZERO, "imu_temp": 20 + T} | RATE,
     "a time T": {"T": T} | RATE,
     "the arrival beside the stamp": {"%time": 1e9 * (1.7e9 + LATE), "field.header.seq": T}
-    | {"field.header.stamp": np.round(1e9 * T)}
+    | {"field.header.stamp": np.round(1e9 * EPOCH)}
     | block("field.angular_velocity.*", "xyz", W),
     "arrival and log times": {"log_time": LATE, "publish_time": LATE + 1e-3, "timestamp": T} | RATE,
     "ROS 2 sec and nanosec": {"header.stamp.sec": SEC, "header.stamp.nanosec": NANO} | QUAT | RATE,
@@ -78,7 +79,7 @@ READ = {
     "a name of the body": TIME | block("drone1/attitude_q_*", "wxyz", WXYZ) | block("drone1/w_*", "xyz", W),
     "order in the name": TIME | block("quaternion_xyzw_*", NUMBERS, XYZW) | RATE,
     "TUM": {"#timestamp": T} | block("t*", "xyz", NOISE) | block("q*", "xyzw", XYZW),
-    "EuRoC ground truth": {"#timestamp": np.round(1e9 * T)}
+    "EuRoC ground truth": {"#timestamp": np.round(1e9 * EPOCH)}
     | block("p_RS_R_* [m]", "xyz", NOISE)
     | block("q_RS_* []", "wxyz", WXYZ)
     | block("v_RS_R_* [m s^-1]", "xyz", NOISE)
@@ -87,25 +88,25 @@ READ = {
     "EuRoC": {"#timestamp [ns]": np.round(1e9 * T)}
     | block("w_RS_S_* [rad s^-1]", "xyz", W)
     | block("a_RS_S_* [m s^-2]", "xyz", NOISE),
-    "ROS topic": {"%time": np.round(1e9 * T)}
+    "ROS topic": {"%time": np.round(1e9 * EPOCH)}
     | block("field.orientation.*", "xyzw", XYZW)
     | block("field.orientation_covariance*", "012345678", np.zeros((len(T), 9)))
     | block("field.angular_velocity.*", "xyz", W)
     | block("field.angular_velocity_covariance*", "012345678", np.zeros((len(T), 9)))
     | block("field.linear_acceleration.*", "xyz", NOISE)
     | block("field.linear_acceleration_covariance*", "012345678", np.zeros((len(T), 9))),
-    "ROS odometry": {"%time": np.round(1e9 * T)}
+    "ROS odometry": {"%time": np.round(1e9 * EPOCH)}
     | block("field.pose.pose.position.*", "xyz", NOISE)
     | block("field.pose.pose.orientation.*", "xyzw", XYZW)
     | block("field.pose.covariance*", [str(i) for i in range(36)], np.zeros((len(T), 36)))
     | block("field.twist.twist.linear.*", "xyz", NOISE)
     | block("field.twist.twist.angular.*", "xyz", W)
     | block("field.twist.covariance*", [str(i) for i in range(36)], np.zeros((len(T), 36))),
-    "PlotJuggler": {"__time": T}
+    "PlotJuggler": {"__time": 1.7e9 + LATE}
     | block("/imu/orientation/*", "xyzw", XYZW)
     | block("/imu/angular_velocity/*", "xyz", W)
     | block("/imu/orientation_covariance[*;0]", "012345678", np.zeros((len(T), 9)))
-    | {"/imu/header/stamp": LATE},
+    | {"/imu/header/stamp": EPOCH},
     "MuJoCo free joint": TIME
     | block("qpos[*]", "0123456", np.hstack([NOISE, WXYZ]))
     | block("qvel[*]", "012345", np.hstack([NOISE, W])),
@@ -203,19 +204,19 @@ READ = {
 """Layouts that are read without options."""
 
 ASKED = {
-    "PX4 rates": {"timestamp": np.round(1e6 * T), "timestamp_sample": np.round(1e6 * T) - 200}
+    "PX4 rates": {"timestamp": T + 2e-4, "timestamp_sample": T}
     | block("xyz[*]", "012", W)
     | block("xyz_derivative[*]", "012", NOISE),
     "frames only": {"frame": np.arange(len(T)) * 1.0} | RATE,
     "an index only": {"": np.arange(len(T)) * 1.0} | RATE,
-    "two times": {"device_time (s)": T, "host_clock_time (s)": LATE} | RATE,
+    "two times": {"time_a (s)": T, "time_b (s)": LATE} | RATE,
     "two IMUs": TIME | block("gyro_1_* (rad/s)", "xyz", W) | block("gyro_2_* (rad/s)", "xyz", W + 0.01 * NOISE),
     "raw and filtered": TIME | block("gyro_* (rad/s)", "xyz", W) | block("gyro_filtered_* (rad/s)", "xyz", W + 0.01 * NOISE),
     "two attitudes": TIME | block("q_a_*", "wxyz", WXYZ) | block("q_b_*", "wxyz", WXYZ[::-1]),
-    "names of letters": {"stamp_ms": 1e3 * T} | block("a*", "xyz", NOISE) | block("b*", "xyz", W),
-    "names in another script": {"время": T} | block("скорость *", ("х", "у", "з"), W),
+    "names of letters": {"stamp_ms": 1e3 * T} | block("a*", "xyz", NOISE) | block("g*", "xyz", W),
+    "names in another script": {"время": T} | block("скорость *", ("х", "у", "ц"), W),
     "the same names twice": TIME | block("w_* (rad/s)", "xyz", W) | block("w_* (rad/s) ", "xyz", W + 0.1),
-    "Euler angles without a sequence": TIME | block("euler_* (rad)", "xyz", ZXZ),
+    "Euler angles without a sequence": TIME | block("euler_* (deg)", "zyx", YPR),
 }
 """Layouts that are a question: the message names an option with which they are read."""
 
@@ -326,14 +327,13 @@ def write(folder, columns, separator=",", name="log.csv", comma=False):
 def settled(path, **options):
     """The recording, with what only the motion of the scene decides."""
     recording = read(path, Options(**options))
-    scene = FREE.rename("free", R_WB0=R[0], w_WB_B0=W[0])
-    return prepare(scene, recording, True, None).recording
+    return prepare(FREE_SCENE, recording, True, None).recording
 
 
 def compare(recording, attitudes=True, rates=True):
     """The recording has the times, the attitudes and the rates of the motion, as far as the file has them."""
     t = recording.t - recording.t[0]
-    np.testing.assert_allclose(t, T, atol=3e-7)  # times since 1970 have 256 ns as their last bit; others measured: 2e-16
+    np.testing.assert_allclose(t, T, atol=6e-7)  # times since 1970 have 256 ns as their last bit; others measured: 2e-16
     assert (recording.data[0] is not None, recording.data[1] is not None) == (attitudes, rates)
     for found, expected in zip(recording.data, (R, W), strict=True):
         if found is not None:
@@ -342,7 +342,7 @@ def compare(recording, attitudes=True, rates=True):
 
 def has(columns):
     """Whether columns of a layout are attitudes and rates, by their values."""
-    turns = [*WXYZ.T, *VECTOR.T, *MRP.T, *MATRIX.T, *YPR.T, *np.radians(YPR).T, *ZXZ.T]
+    turns = [*WXYZ.T, *VECTOR.T, *MRP.T, *MATRIX.T, *YPR.T, *np.radians(YPR).T, *ZXZ.T, *np.degrees(ZXZ).T]
     return [any(np.array_equal(x, y) for x in columns.values() for y in parts) for parts in (turns, [*W.T, *DEG.T])]
 
 
@@ -362,6 +362,42 @@ def test_a_text_is_read_without_options(name, tmp_path):
     compare(recording, *have)
     assert any(have)
     assert recording.doubt(None) == ""
+
+
+FREE_SCENE = FREE.rename("free", R_WB0=R[0], w_WB_B0=W[0])
+GREEK = "phi", "theta", "psi"
+UNITS = {
+    "rates, rad": (TIME | block("w_*", "xyz", W), {}),
+    "rates, deg": (TIME | block("w_*", "xyz", DEG), {}),
+    "rates, deg, from another row on": (TIME | block("w_*", "xyz", np.degrees(exact(FREE, T + 0.3)[1])), {}),
+    "3-1-3 angles, rad": (TIME | block("*", GREEK, ZXZ), {"euler": "zxz"}),
+    "3-1-3 angles, deg": (TIME | block("*", GREEK, np.degrees(ZXZ)), {"euler": "zxz"}),
+    "3-1-3 angles with a unit": (TIME | block("* (deg)", GREEK, np.degrees(ZXZ)), {"euler": "zxz"}),
+    "angles": (TIME | block("*", RPY, YPR[:, ::-1]), {}),
+    "angles and rates": (TIME | block("*", RPY, YPR[:, ::-1]) | block("gyro_*", "xyz", W), {}),
+}
+
+
+@pytest.mark.parametrize("name", UNITS)
+def test_a_unit_that_no_name_has_follows_from_the_motion_of_the_scene(name, tmp_path):
+    columns, options = UNITS[name]
+    recording = settled(write(tmp_path, columns), **options)
+    if "another row" in name:
+        np.testing.assert_allclose(recording.data[1], exact(FREE, T + 0.3)[1], atol=1e-12)
+    else:
+        compare(recording, *has(columns))
+
+
+@pytest.mark.parametrize("spin", [0.0, 1e-3])
+def test_a_unit_that_the_motion_does_not_show_is_a_question(spin, tmp_path):
+    """A constant rate that the scene does not start with is a motion in any unit."""
+    path = write(tmp_path, TIME | block("w_*", "xyz", np.outer(ONE, [0, 0, spin])))
+    scene = cv.Scene("ball", cv.RigidBody([1.0, 1.0, 1.0]), np.eye(3), [0.0, 0.0, 5.0], 1.0)
+    with pytest.raises(BadInput) as error:
+        prepare(scene, read(path, Options()), True, None)
+    options = answer(error.value)
+    assert list(options) == ["units"]
+    assert prepare(scene, read(path, Options(**options)), True, None).recording.layout.open == []
 
 
 def answer(error):
