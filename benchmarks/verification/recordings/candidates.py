@@ -22,6 +22,8 @@ Sample = Callable[[Sequence[str]], Array]
 """A function that returns the first rows of columns; it raises `BadInput` for columns without numbers."""
 SAME = 1e-6
 """Largest difference of equal columns, relative to the largest number, or to the gap of times."""
+MOST = 12
+"""Largest number of sets of columns of a quantity, or of times, of which the data choose."""
 BETTER, AGREES = 0.1, 0.1
 """Largest disagreement of attitudes and rates, relative to the next one, and to the turns."""
 Sets = dict[str, list[list[str]]]
@@ -34,7 +36,8 @@ def compared_with(kind: str) -> str:
 
 def decide_time(times: list[list[str]], motion: Sequence[str], layout: Layout, sample: Sample) -> list[list[str]]:
     """Return the times that are left: one, if the likeliest ones have the same steps. Others are unused, with the reason."""
-    if len(times) < 2:
+    times = [part for time in times for part in _parts(time, sample)] if len(times) <= MOST else times
+    if len(times) < 2 or len(times) > MOST:
         return times
     values = {tuple(time): _seconds(time, sample) for time in times}
     usable = [time for time in times if _increases(values[tuple(time)])]
@@ -57,6 +60,18 @@ def decide_time(times: list[list[str]], motion: Sequence[str], layout: Layout, s
         if time != first:
             layout.unused |= dict.fromkeys(time, reason)
     return [first, *(time for time in likely if time not in same)]
+
+
+def _parts(time: list[str], sample: Sample) -> list[list[str]]:
+    """Return seconds and their fractions as one time, or as two if the second one is no fraction by its numbers."""
+    if len(time) == 2:
+        try:
+            whole, fraction = (sample([name])[:, 0] for name in time)
+        except BadInput:
+            return [time]
+        if np.nanmax(np.abs(fraction)) * FRACTIONS[parse(time[1]).all[-1]] > 1 or (np.fmod(whole, 1) != 0).any():
+            return [[name] for name in time]
+    return [time]
 
 
 def _seconds(time: Sequence[str], sample: Sample) -> Array:
@@ -83,13 +98,14 @@ def _grain(t: Array) -> float:
 
 
 def _same_steps(t: Array, other: Array) -> bool:
-    """Return whether two times have the same steps, in units that differ by a power of ten."""
+    """Return whether two times have the same steps, in units that differ by a power of ten or a day."""
     n = min(len(t), len(other))
     bits = 4 * np.spacing(np.abs(t).max(initial=0.0)), 4 * np.spacing(np.abs(other).max(initial=0.0))
     t, other = t[:n] - t[:1], other[:n] - other[:1]
     if n < 2 or t[-1] <= 0 or other[-1] <= 0:
         return False
-    ratio = 10.0 ** round(math.log10(other[-1] / t[-1]))
+    ratios = [10.0 ** round(math.log10(other[-1] / t[-1] * days)) / days for days in (1.0, 86_400.0, 1 / 86_400)]
+    ratio = min(ratios, key=lambda size: abs(size / (other[-1] / t[-1]) - 1))
     gap = float(np.median(np.diff(t)))
     allowed = SAME * gap + bits[0] + bits[1] / ratio
     return bool(np.abs(other / ratio - t).max() <= allowed)
@@ -103,6 +119,10 @@ def decide_sets(
     Sets with the same numbers are one reading, and the others are compared with it. Of different ones, attitudes and rates
     choose the one with which they agree.
     """
+    if max(map(len, sets.values())) > MOST:
+        return [
+            {"time": time} | {kind: some[i % len(some)] for kind, some in sets.items()} for time in times for i in range(MOST)
+        ]
     for kind, members in sets.items():
         sets[kind] = _without_same(kind, members, layout, options, sample)
     readings: list[dict[str, list[str]]] = [{"time": time} for time in times]
@@ -116,13 +136,13 @@ def decide_sets(
         key=lambda pair: pair[0],
     )
     if ranked[0][0] > AGREES or ranked[1][0] * BETTER < ranked[0][0]:
-        return readings
+        return [readings[i] for off, i in ranked if off <= AGREES or ranked[0][0] > AGREES]
     best = readings[ranked[0][1]]
     open_ = [kind for kind in best if any(reading[kind] != best[kind] for reading in readings)]
     for kind in open_:
         partner = "rates" if kind in ATTITUDES else "attitudes" if kind == "rates" else "attitudes and rates"
         layout.notes.append(
-            f"{', '.join(best[kind])}: chosen as {kind}, because {partner} agree with them, and not with others."
+            f"{', '.join(best[kind])}: chosen as {kind}, because {partner} agree with these columns, and not with others."
         )
         for reading in readings:
             names = [name for name in reading[kind] if name not in best[kind]]

@@ -2,26 +2,34 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import shlex
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
+
+from conservative.attitude import Array
 from conservative.errors import BadInput
 
 from .candidates import Sample, compared_with, decide_sets, decide_time
 from .layout import ATTITUDES, Layout, Options
 from .names import ANGLES, GREEK, parse
-from .quantities import HORIZON, find_sets, is_moving, looks, other
+from .quantities import HORIZON, find_sets, is_moving, is_world, looks, other
 from .times import FRACTIONS, find_times, is_counter
 from .units import find_sizes
 
 MOST_COLUMNS = 10_000
 """Largest number of columns of a file."""
+MOST_GUESSED = 60
+"""Largest number of columns among which a rotation is searched, for an example."""
 MOVES = "an attitude relative to a frame that moves"
 PLACES = "angles to the local horizon, which moves; --euler zyx if they turn body to inertial axes"
 SEQUENCE = "their sequence is not known; add --euler with it, such as --euler zyx"
+PART = "a part of an attitude or of rates by its name, without the other parts"
+NOTHING = "neither a time nor an attitude nor a rate by its name"
 SHORT = {"time": "time", "rates": "w", "quaternion": "q", "matrix": "R", "angles": "euler", "rotation vector": "rotvec"} | {
     "axis and angle": "axis",
     "modified Rodrigues": "mrp",
@@ -46,9 +54,11 @@ def choose(path: Path, layout: Layout, options: Options, sample: Sample) -> Layo
         missing = "attitudes or rates" if times else "the time"
         chosen = {kind: some[0] for kind, some in sets.items()} | named
         got = f"{path} without columns of {missing}: {_understood(names, times, chosen, layout)}"
-        raise BadInput("run", got, _hint(names, times, chosen, layout))
+        raise BadInput("run", got, _hint(names, times, chosen, layout, sample))
     _choose_attitude(path, sets, layout, options)
-    times = decide_time(times, [name for some in sets.values() for name in some[0]], layout, sample)
+    times = (
+        times if named.get("time") else decide_time(times, [name for some in sets.values() for name in some[0]], layout, sample)
+    )
     readings = decide_sets(times, sets, layout, options, sample) if sets else [{**named, "time": time} for time in times]
     if len(readings) > 1:
         raise _ask(path, names, readings)
@@ -58,10 +68,13 @@ def choose(path: Path, layout: Layout, options: Options, sample: Sample) -> Layo
     for kind in ("time", "rates", *ATTITUDES):
         if kind in chosen or kind == "rates":
             layout.used[kind] = find_sizes(path, layout, kind, chosen[kind], options) if kind in chosen else {}
+    if not options.columns and not options.world and "rates" in chosen and is_world(chosen["rates"]):
+        got = f"{path} with rates in axes that do not turn along, by their names: {', '.join(chosen['rates'])}"
+        raise BadInput("run", got, f"--rates world and attitudes; or, for body axes, {name_columns(chosen, names)}")
     counts = Counter(name for part in chosen.values() for name in part)
     if twice := [name for name, count in counts.items() if count > 1]:
         raise BadInput("columns", repr(options.columns), f"each column once, and not {twice[0]!r} twice")
-    reasons = {name: other(name) or "neither a time nor an attitude nor a rate by its name" for name in names} | layout.unused
+    reasons = {name: other(name) or (PART if looks(name) else NOTHING) for name in names} | layout.unused
     layout.unused = {name: reasons[name] for name in names if name not in counts}
     layout.doubtful = _find_doubtful(layout) if named.keys() <= {"time"} else []
     return layout
@@ -70,15 +83,17 @@ def choose(path: Path, layout: Layout, options: Options, sample: Sample) -> Layo
 def _choose_attitude(path: Path, sets: dict[str, list[list[str]]], layout: Layout, options: Options) -> None:
     """Leave the best kind of attitudes in the sets of columns; the others are compared with it."""
     kinds = [kind for kind in ATTITUDES if kind in sets]
-    for kind in kinds[1:]:
-        layout.also += [(kind, members) for members in sets.pop(kind)]
-    layout.unused |= dict.fromkeys(_flat(members for _, members in layout.also), compared_with(kinds[0])) if kinds[1:] else {}
-    if kinds[:1] == ["angles"] and options.euler is None:
-        unknown = [members for members in sets["angles"] if parse(members[0]).label not in _AXES]
-        layout.unused |= dict.fromkeys(_flat(unknown), SEQUENCE)
+    unknown = [] if options.euler else [members for members in sets.get("angles", ()) if parse(members[0]).label not in _AXES]
+    if unknown and kinds != ["angles"]:  # other attitudes show their sequence
+        kinds = [*(kind for kind in kinds if kind != "angles"), "angles"]
+    elif unknown:
         sets["angles"] = [members for members in sets["angles"] if members not in unknown]
+        layout.unused |= dict.fromkeys(_flat(unknown), SEQUENCE)
         if not sets["angles"] and not sets.pop("angles") and not sets:
             raise _no_sequence(path, unknown[0])
+    for kind in kinds[1:]:
+        layout.also += [(kind, members) for members in sets.pop(kind)]
+    layout.unused |= {name: compared_with(kinds[0]) for _, members in layout.also for name in members}
 
 
 def _flat(lists: Iterable[Sequence[str]]) -> list[str]:
@@ -236,10 +251,32 @@ def _understood(
     )[:600]
 
 
-def _hint(names: Sequence[str], times: Sequence[Sequence[str]], chosen: dict[str, list[str]], layout: Layout) -> str:
+def _guess(names: Sequence[str], sample: Sample) -> dict[str, list[str]]:
+    """Return neighbouring columns whose numbers are a rotation: matrices, or quaternions of norm 1; {} without any."""
+    numbers = dict[str, Array]()
+    for name in names[:MOST_GUESSED]:
+        with contextlib.suppress(BadInput):
+            numbers[name] = sample([name])[:, 0]
+    for kind, size in (("matrix", 9), ("quaternion", 4)):
+        for start in range(len(numbers) - size + 1):
+            members = [*numbers][start : start + size]
+            x = np.column_stack([numbers[name] for name in members])
+            with np.errstate(all="ignore"):
+                off = np.abs((x**2).sum(axis=1) - size // 3) if kind == "matrix" else np.abs((x**2).sum(axis=1) - 1)
+            if len(x) and (off < 1e-3).all() and (np.ptp(x, axis=0) > 1e-6).sum() > 1:
+                return {kind: members}
+    return {}
+
+
+def _hint(
+    names: Sequence[str], times: Sequence[Sequence[str]], chosen: dict[str, list[str]], layout: Layout, sample: Sample
+) -> str:
     """Return the option that names the columns of this file, with three columns that differ by their axes if there are such."""
-    if all(name.isdigit() for name in names):
-        return "the columns by number, such as --columns time=1,w=2:3:4 --units rad, or time=1,q=2:3:4:5"
+    if names == [str(i + 1) for i in range(len(names))]:
+        if len(names) < 4:
+            return "a time and three columns or more"
+        text = name_columns({"time": [names[0]]} | (_guess(names[1:], sample) or {"rates": names[1:4]}), names)
+        return f"the columns by number, such as {text}{' --units rad' * ('w=' in text)}"
     taken = {*_flat(chosen.values()), *layout.unused}
     free = [name for name in names if name not in taken]
     likely = next((name for name in free if re.search("time|date|stamp|tick|clock", name.lower())), None)
@@ -254,8 +291,10 @@ def _hint(names: Sequence[str], times: Sequence[Sequence[str]], chosen: dict[str
     sets = sorted(
         (sorted(group) for group in groups.values() if len(group) == 3), key=lambda group: "g" not in group[0].lower()
     )
+    chosen = chosen or dict(find_sets([name for name in names if name not in time], others=True))
+    chosen = chosen or _guess(names, sample)
     if not chosen:
-        rest = [name for name in names if name not in time]
+        rest = sorted((name for name in names if name not in time and not other(name)), key=len)
         chosen = {"rates": sets[0] if sets else rest[:3]}
         if len(chosen["rates"]) < 3:
             return "columns of attitudes or rates; --columns time=NAME,w=X:Y:Z names them"

@@ -8,6 +8,12 @@ import unicodedata
 from dataclasses import dataclass
 from functools import lru_cache
 
+
+def vocabulary(text: str) -> frozenset[str]:
+    """Return the words of a text."""
+    return frozenset(text.split())
+
+
 TURNS = {
     **dict.fromkeys(("rad/s", "rad_s", "rad/sec", "rad_sec", "rads", "rad s^-1", "rad s-1", "rad.s-1", "rad*s^-1", "1/s"), 1.0),
     **dict.fromkeys(("deg/s", "deg_s", "deg/sec", "deg_sec", "dps", "°/s", "deg s^-1", "deg s-1", "grad/s"), math.pi / 180),
@@ -17,18 +23,18 @@ TURNS = {
 """Units of rates only, in rad/s, by their names, lower case."""
 SECONDS = {
     **dict.fromkeys(("s", "sec", "secs", "second", "seconds", "epsec"), 1.0),
-    **{"min": 60.0},
+    **{"min": 60.0, "days": 86_400.0, "day": 86_400.0, "hours": 3600.0, "hour": 3600.0},
     **dict.fromkeys(("ms", "msec", "msecs", "milliseconds"), 1e-3),
     **dict.fromkeys(("us", "usec", "usecs", "microseconds", "µs", "μs"), 1e-6),
     **dict.fromkeys(("ns", "nsec", "nsecs", "nanoseconds"), 1e-9),
 }
 """Units of times, in s, by their names, lower case."""
-UNITS = {
-    **TURNS,
-    **SECONDS,
+ARCS = {
     **dict.fromkeys(("deg", "degrees", "degree", "°"), math.pi / 180),
     **dict.fromkeys(("rad", "radians", "-", ""), 1.0) | {"mrad": 1e-3},
 }
+"""Units of angles, in rad, and their names for rates in short, lower case."""
+UNITS = TURNS | SECONDS | ARCS
 """Units in rad, s and rad/s by their names, lower case."""
 OTHER_UNITS = frozenset(
     {
@@ -71,61 +77,10 @@ SYNONYMS: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(("millisec", "millisecs", "millisecond", "milliseconds", "msecs", "millis"), ("msec",)),
 }
 """Words of one meaning, also of other languages."""
-_VOCABULARY = frozenset(
-    [
-        "attitude",
-        "orientation",
-        "rotation",
-        "quaternion",
-        "matrix",
-        "vector",
-        "euler",
-        "rodrigues",
-        "gibbs",
-        "omega",
-        "gyro",
-        "angular",
-        "velocity",
-        "rate",
-        "speed",
-        "body",
-        "angle",
-        "axis",
-        "time",
-        "stamp",
-        "header",
-        "elapsed",
-        "seconds",
-        "secs",
-        "sec",
-        "imu",
-        "sensor",
-        "acc",
-        "accel",
-        "adc",
-        "bias",
-        "temp",
-        "cmd",
-        "wheel",
-        "motor",
-        "raw",
-        "data",
-        "roll",
-        "pitch",
-        "yaw",
-        "phi",
-        "theta",
-        "psi",
-        "msec",
-        "usec",
-        "nsec",
-        "dcm",
-        "mrp",
-        "sigma",
-        "qpos",
-        "qvel",
-        "bdy",
-    ]
+_VOCABULARY = vocabulary(
+    "attitude orientation rotation quaternion matrix vector euler rodrigues gibbs omega gyro angular velocity rate speed body "
+    "angle axis time stamp header elapsed seconds secs sec imu sensor acc accel adc bias temp cmd wheel motor raw data dot "
+    "roll pitch yaw phi theta psi msec usec nsec dcm mrp sigma qpos qvel bdy"
 )
 _COMPOUND = _VOCABULARY | SYNONYMS.keys()
 _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[0-9]+|[./:]|[^\W\d_]+")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from .names import ANGLES, GREEK, LABELS, LETTERS, OTHER_UNITS, TURNS, parse
+from .names import ANGLES, ARCS, GREEK, LABELS, LETTERS, OTHER_UNITS, TURNS, parse, vocabulary
 
 XYZ: tuple[tuple[str, ...], ...] = (tuple("xyz"), tuple("123"), tuple("012"))
 _MATRIX = tuple(tuple(row + column for row in digits for column in digits) for digits in ("123", "012", "xyz"))
@@ -35,23 +35,23 @@ QUANTITIES = (
         "rates",
         _all("gyro", "omega", "angular velocity", "angular rate", "angular speed", "body rate", "rotation rate")
         + _all("rotation velocity", "twist angular"),
-        frozenset(("w", "rate")),
+        vocabulary("w rate"),
         (*XYZ, ANGLES, tuple("pqr")),
         (tuple("pqr"),),
     ),
     Quantity(
         "quaternion",
         _all("quaternion", "orientation", "rotation", "attitude"),
-        frozenset(("q", "rot")),
+        vocabulary("q rot"),
         (tuple("wxyz"), ("real", "i", "j", "k"), tuple("rijk"), tuple("0123"), tuple("1234")),
     ),
     Quantity("quaternion", (), frozenset("e"), (tuple("0123"),)),
-    Quantity("matrix", _all("dcm", "matrix"), frozenset(("r", "m", "c", "rotation")), (*_MATRIX, *_FLAT)),
+    Quantity("matrix", _all("dcm", "matrix"), vocabulary("r m c rotation"), (*_MATRIX, *_FLAT)),
     Quantity("axis and angle", _all("axis"), frozenset(), ((*"xyz", "angle"), (*"123", "angle"))),
     Quantity("angles", _all("euler", "angle", "attitude", "orientation"), frozenset(), (ANGLES,), (ANGLES,)),
     Quantity("angles", _all("euler", "angle"), frozenset(), XYZ),
     Quantity("aircraft angles", _all("euler", "angle", "attitude", "orientation"), frozenset(), (GREEK,), (GREEK,)),
-    Quantity("rotation vector", _all("rotation vector", "rot vector", "so 3"), frozenset(("r", "rv")), XYZ),
+    Quantity("rotation vector", _all("rotation vector", "rot vector", "so 3"), vocabulary("r rv"), XYZ),
     Quantity("modified Rodrigues", _all("mrp", "modified rodrigues"), frozenset(("sigma",)), XYZ),
     Quantity("Rodrigues", _all("rodrigues", "gibbs", "crp"), frozenset(), XYZ),
 )
@@ -62,43 +62,27 @@ _ALONE = [*((word,) for word in GREEK), *(("w", axis) for axis in "xyz")]
 OTHERS = {
     "a deviation, a bias or an error": "covariance cov variance var std stddev deviation uncertainty bias biases drift noise "
     "error err residual innovation rms sigma accuracy offset confidence correction",
-    "a command, a reference or a limit": "cmd command commanded setpoint sp target desired des demand demanded reference ref "
-    "goal trim stick rc limit limits range max min nominal guidance",
-    "a derivative, a torque or a momentum": "acc accel acceleration dot derivative deriv jerk torque torques moment force "
-    "momentum impulse energy power pdot qdot rdot linear",
+    "a command, a reference, a target or a limit": "cmd command commanded setpoint sp target desired des demand demanded "
+    "reference ref goal trim stick rc limit limits range max min nominal guidance",
+    "a derivative, a load, a momentum or an energy": "acc accel acceleration dot derivative deriv jerk torque torques moment "
+    "force momentum impulse energy power pdot qdot rdot",
     "a temperature": "temp temperature temperatur",
-    "of another part": "wheel wheels rw rotor motor gimbal propeller prop servo joint esc reaction engine",
+    "of another part": "wheel wheels rw rotor motor gimbal propeller servo joint esc",
     "a count, a state or a magnitude": "count counter status flag flags mode valid quality reset enable enabled norm magnitude "
-    "absolute absolut abs total id control aileron elevator rudder throttle gain delta pressure position",
+    "absolute absolut abs total id control aileron elevator rudder throttle gain delta",
+    "a position, a linear velocity or a pressure": "position pos linear pressure altitude",
 }
 """Words of other quantities, by what they are."""
 _REASONS = {word: reason for reason, words in OTHERS.items() for word in words.split()}
-MOVING = frozenset(("lvlh", "vvlh", "orbit", "orbital", "rtn", "rsw", "hill", "ned", "relative", "bl", "lb", "br"))
+MOVING = vocabulary("lvlh vvlh orbit orbital rtn rsw hill ned relative bl lb br")
 """Words of frames that move."""
-HORIZON = frozenset(("latitude", "longitude", "geodetic", "msl", "lat", "lon"))
+HORIZON = vocabulary("latitude longitude geodetic msl lat lon")
 """Words of places, next to which angles are relative to the horizon."""
 _BIASES = ("b", "w"), ("b", "g"), ("b", "a"), ("bw",), ("bg",), ("ba",)
-_WORLD = frozenset(("world", "global"))
-_POINTS = frozenset(
-    [
-        "imu",
-        "sensor",
-        "body",
-        "device",
-        "est",
-        "estimated",
-        "estimate",
-        "true",
-        "truth",
-        "meas",
-        "measured",
-        "filtered",
-        "filter",
-        "gt",
-        "inertial",
-    ]
-)
-_LONG_SHORT = 3
+_ATTITUDE = vocabulary("orientation attitude rotation rot")
+_WORLD = vocabulary("world global")
+_POINTS = vocabulary("imu sensor body device est estimated estimate true truth meas measured filtered filter gt inertial")
+_LONGEST_FRAME = 3
 
 
 def other(name: str) -> str:
@@ -130,12 +114,14 @@ def looks(name: str) -> bool:
     return any(part <= words for part in _LOOKS) or parsed.words in _ALONE
 
 
-def find_sets(names: Sequence[str]) -> Iterator[tuple[str, list[str]]]:
+def find_sets(names: Sequence[str], others: bool = False) -> Iterator[tuple[str, list[str]]]:
     """Yield the complete sets of columns of quantities, each with its kind, in the order of the file.
 
-    Letters name parts before numbers do: gyro_1_x, gyro_2_x and gyro_3_x are no set.
+    Letters name parts before numbers do: gyro_1_x, gyro_2_x and gyro_3_x are no set. With `others` commands and references are
+    sets, too.
     """
-    usable = [name for name in names if parse(name).words and not other(name) and parse(name).unit not in OTHER_UNITS]
+    usable = [name for name in names if parse(name).words and parse(name).unit not in OTHER_UNITS]
+    usable = usable if others else [name for name in usable if not other(name)]
     taken = set[str]()
     for numbers in (False, True):
         groups: dict[tuple[tuple[str, ...], int], dict[str, list[str]]] = {}
@@ -176,7 +162,7 @@ def _bare_angle(name: str) -> Iterator[tuple[tuple[tuple[str, ...], int], str]]:
 
 def _kinds(stem: tuple[str, ...], part: int, members: dict[str, list[str]]) -> Iterator[tuple[str, tuple[str, ...]]]:
     """Yield the kind and the labels of the first quantity that words and labels stand for."""
-    words = frozenset(stem) - {"*"}
+    words, numbers = frozenset(stem) - {"*"}, {label for label in members if label.isdigit()}
     company = stem[part:]
     if {"wxyz", "xyzw"} & words:
         words |= {"quaternion"}
@@ -185,11 +171,14 @@ def _kinds(stem: tuple[str, ...], part: int, members: dict[str, list[str]]) -> I
         named = any(named <= words for named in quantity.named) or (quantity.kind == "rates" and turning)
         short = _is_short(company, quantity.short)
         for labels in quantity.sets:
-            if not all(label in members for label in labels):
+            complete = numbers == {*labels} if labels[-1].isdigit() else all(label in members for label in labels)
+            if not complete or (labels in _FLAT and company[0] in "mc"):  # c1 to c9 are channels
                 continue
-            rates = all(parse(members[label][0]).unit in TURNS for label in labels)
+            units = {parse(members[label][0]).unit for label in labels}
+            rates = units <= TURNS.keys()
+            turned = quantity.kind == "angles" and labels in XYZ and words & _ATTITUDE and units <= ARCS.keys()
             spoken = quantity.kind == "rates" and rates and labels not in XYZ[1:] and not words & {"quaternion", "euler"}
-            if named or short or spoken or (labels in quantity.bare and _is_bare(company, labels, rates)):
+            if named or short or spoken or turned or (labels in quantity.bare and _is_bare(company, labels, rates)):
                 yield quantity.kind, labels
         if named and quantity.kind == "rates":
             return
@@ -202,7 +191,7 @@ def _is_short(company: tuple[str, ...], short: frozenset[str]) -> bool:
         return False
     before, after = company[:at], company[at + 1 :]
     return all(len(word) > 1 or word.isdigit() or (word == "*" and at == 1) for word in before) and all(
-        word == "*" or len(word) <= _LONG_SHORT or word.isdigit() or word in _POINTS | _WORLD | MOVING | {"wxyz", "xyzw"}
+        word == "*" or len(word) <= _LONGEST_FRAME or word.isdigit() or word in _POINTS | _WORLD | MOVING | {"wxyz", "xyzw"}
         for word in after
     )
 

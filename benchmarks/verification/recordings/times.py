@@ -5,103 +5,31 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from .names import SECONDS, parse
+from .names import SECONDS, parse, vocabulary
 from .quantities import other
 
+DATES = dict.fromkeys(("utcg", "utc", "txt", "text", "date", "iso", "iso8601", "tai", "gps", "tdb", "local", "local time"), 1.0)
+"""What times are called that are read as dates or in s, in the place of a unit."""
+DAYS = frozenset(("julian", "jd", "mjd"))
+"""Words of times in days."""
 FRACTIONS = {"nsec": 1e-9, "ns": 1e-9, "usec": 1e-6, "us": 1e-6, "msec": 1e-3, "ms": 1e-3}
 """Last words of columns with the fractions of seconds in another column, and their units, s."""
 _WHOLE = frozenset(("sec", "secs", "second", "seconds", "s"))
-_TIMES = frozenset(
-    {"time", "stamp", "elapsed", "epoch", "unix", "utc", "date", "datetime", "clock", "heure", "datum", "uhrzeit"}
-    | {"second", "seconds", "sec", "secs", "msec", "usec", "nsec"}
+_TIMES = vocabulary(
+    "time stamp elapsed epoch unix utc date datetime clock heure datum uhrzeit julian jd mjd "
+    "second seconds sec secs msec usec nsec"
 )
-_SPANS = frozenset(
-    [
-        "dt",
-        "delay",
-        "latency",
-        "step",
-        "interval",
-        "exposure",
-        "remaining",
-        "duration",
-        "period",
-        "solve",
-        "compute",
-        "constant",
-        "scale",
-        "sync",
-        "zone",
-        "week",
-        "lag",
-        "diff",
-        "age",
-        "per",
-        "rate",
-        "frequency",
-        "cost",
-        "iteration",
-        "fine",
-    ]
+_SPANS = vocabulary(
+    "dt delay latency step interval exposure remaining duration period solve compute constant scale sync zone week lag diff "
+    "age per rate frequency cost iteration fine"
 )
 """Words of spans of time, which are not the time of a row."""
-_MEASURED = frozenset(["header", "sample", "measurement", "measured", "sensor", "capture", "acquisition"])
-_ARRIVED = frozenset(
-    [
-        "arrival",
-        "arrived",
-        "receive",
-        "received",
-        "recv",
-        "rx",
-        "log",
-        "logging",
-        "logged",
-        "publish",
-        "published",
-        "host",
-        "wall",
-        "system",
-        "record",
-        "recorded",
-        "write",
-        "receipt",
-        "pc",
-        "cpu",
-        "accelerometer",
-        "location",
-        "gps",
-        "gnss",
-        "mag",
-        "magnetometer",
-        "altimeter",
-        "battery",
-        "video",
-        "audio",
-        "camera",
-    ]
+_MEASURED = vocabulary("header sample measurement measured sensor capture acquisition")
+_ARRIVED = vocabulary(
+    "arrival arrived receive received recv rx log logging logged publish published host wall system record recorded write "
+    "receipt pc cpu accelerometer location gps gnss mag magnetometer altimeter battery video audio camera"
 )
-_COUNTERS = frozenset(
-    [
-        "frame",
-        "frames",
-        "index",
-        "idx",
-        "row",
-        "sample",
-        "number",
-        "n",
-        "i",
-        "k",
-        "counter",
-        "count",
-        "step",
-        "tick",
-        "ticks",
-        "packet",
-        "seq",
-    ]
-)
+_COUNTERS = vocabulary("frame frames index idx row sample number n i k counter count step tick ticks packet seq")
 
 
 def find_times(names: Sequence[str]) -> list[list[str]]:
@@ -114,7 +42,6 @@ def find_times(names: Sequence[str]) -> list[list[str]]:
         if (words := parse(name).all) and words[-1] in FRACTIONS
         for word in _WHOLE
         if (whole := (*words[:-1], word)) in by_words
-        and (words[-1] not in ("ns", "us", "ms") or not words[:-1] or "stamp" in words or "tv" in words)
     ]
     taken = {name for pair in pairs for name in pair}
     return [*pairs, *([name] for name in singles if name not in taken)]
@@ -124,7 +51,12 @@ def _is_time(name: str) -> bool:
     """Return whether a column is the time of a row by the words of its name."""
     parsed = parse(name)
     words = parsed.words
-    if not words or (parsed.unit is not None and parsed.unit not in SECONDS) or other(name) or _SPANS.intersection(words):
+    if (
+        not words
+        or (parsed.unit is not None and parsed.unit not in SECONDS | DATES)
+        or other(name)
+        or _SPANS.intersection(words)
+    ):
         return False
     alone = words[parsed.part :] == ("t",) or (
         "t" in words and len(words) < 4 and not any(len(word) < 2 and word != "t" for word in words)

@@ -19,7 +19,7 @@ from conservative.errors import BadInput
 from .attitudes import convert
 from .layout import Layout, Options
 from .names import UNITS, parse
-from .times import FRACTIONS
+from .times import DATES, DAYS, FRACTIONS
 
 ANGULAR = 1.0, math.pi / 180
 """Units that angles and rates without a unit may have: rad and deg."""
@@ -41,6 +41,10 @@ def find_sizes(path: Path | None, layout: Layout, kind: str, names: Sequence[str
             return {names[0]: 1.0, names[1]: FRACTIONS[parse(names[1]).all[-1]]}
         if names[0] in layout.steps:
             return {names[0]: layout.steps[names[0]]}
+        if DAYS.intersection(parse(names[0]).words):
+            return {names[0]: 86_400.0}
+        if parse(names[0]).unit in DATES:
+            return {names[0]: 1.0}
     usual: str | None = "s" if kind == "time" else "rad"
     texts, united = [parse(name).unit for name in names], kind in ("rates", "angles", "rotation vector")
     if None in texts and united:

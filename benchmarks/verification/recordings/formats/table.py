@@ -20,6 +20,8 @@ from conservative.files import open_file
 
 CHUNK = 50_000
 """Number of rows that are read at a time."""
+FIRST = 1000
+"""Number of rows of the first part."""
 LOOKED = 200
 """Number of lines in which the header and the first row of numbers are searched."""
 LONGEST = 1_000_000
@@ -35,6 +37,8 @@ _LIST = re.compile(
     rf"(?:[A-Za-z_]\w{{0,19}})?[\[({{]{{0,2}}\s*((?:{_NUMBER})(?:\s*[,;\s]\s*(?:{_NUMBER})){{2,15}})\s*[\])}}]{{0,2}}"
 )
 _CLOCK = re.compile(r"(\d{1,2}):(\d\d):(\d\d(?:\.\d+)?)")
+_DATED = re.compile(r"\d{4}[-/]\d\d[-/]|\d{1,2}:\d\d:|\d{1,2}[ -][A-Za-z]{3}[ -]\d{4}")
+_SPOKEN = re.compile(r"(\d{1,2})[ -]([A-Za-z]{3})[ -](\d{4})\s+(\d\d:\d\d:\d\d(?:\.\d+)?)")
 _DATE = re.compile(r"(\d{4}[-/]\d\d[-/]\d\d(?:[T ]\d\d:\d\d(?::\d\d(?:\.\d+)?)?)?)\s?(?:Z|UTC|([-+])(\d\d):?(\d\d))?")
 UNREADABLE = OSError, ValueError, TypeError, RecursionError
 """Errors of files that cannot be read, and of values such as JSON in a thousand brackets."""
@@ -94,7 +98,9 @@ class Start:
         """Yield the lines behind the first ones, in parts; without empty lines and comments."""
         try:
             with self.open() as stream:
-                yield from chunks(_wanted(islice(_each_line(stream), skip, None), comments), CHUNK, AT_ONCE)
+                lines = _wanted(islice(_each_line(stream), skip, None), comments)
+                yield from chunks(islice(lines, FIRST), FIRST, AT_ONCE)  # a small part for those who look at it only
+                yield from chunks(lines, CHUNK, AT_ONCE)
         except UNREADABLE as error:
             raise self.fail(error) from None
 
@@ -146,6 +152,9 @@ def read_date(text: str) -> float:
     """Return a date, as s since 1970, or a time of the day, s. Raises `ValueError` for another text."""
     if match := _CLOCK.fullmatch(text):
         return 3600 * float(match[1]) + 60 * float(match[2]) + float(match[3])
+    if match := _SPOKEN.fullmatch(text):  # 29 Nov 2026 12:00:00.000 of GMAT and STK
+        month = 1 + ["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"].index(match[2].lower())
+        text = f"{match[3]}-{month:02d}-{int(match[1]):02d} {match[4]}"
     if not (match := _DATE.fullmatch(text)):
         raise ValueError(f"not a date: {text[:40]!r}")
     seconds = float(np.datetime64(match[1].replace("/", "-").replace(" ", "T"), "ns").astype(np.int64) * 1e-9)
@@ -189,7 +198,7 @@ def _parse(path: Path, lines: list[str], separator: str | None, wanted: Sequence
             return np.loadtxt(lines, delimiter=separator, usecols=places, ndmin=2, quotechar='"', comments=None)
     except ValueError:
         rows = [words(line, separator) for line in lines]
-    dates = bool(rows) and len(rows[0]) > places[0] and bool(re.match(r"\d{4}[-/]\d\d[-/]|\d{1,2}:\d\d:", rows[0][places[0]]))
+    dates = bool(rows) and len(rows[0]) > places[0] and bool(_DATED.match(rows[0][places[0]]))
     out = np.full((len(rows), len(places)), np.nan)
     for number, row in enumerate(rows):
         for i, place in enumerate(places):
