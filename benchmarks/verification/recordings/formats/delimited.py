@@ -8,7 +8,7 @@ from functools import partial
 from ..names import UNITS
 from .table import Start, Table, cells, words
 
-_NUMBER = re.compile(r"[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?|nan|NaN")
+_NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?|nan|NaN")
 
 
 def read(start: Start) -> Table | None:

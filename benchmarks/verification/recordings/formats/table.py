@@ -26,15 +26,17 @@ LOOKED = 200
 """Number of lines in which the header and the first row of numbers are searched."""
 LONGEST = 1_000_000
 """Largest length of a line, and of the `LOOKED` lines together, characters."""
+LONGEST_LIST = 1000
+"""Largest length of a list of numbers in a field, characters."""
 AT_ONCE = 64 * LONGEST
 """Largest number of characters that are read at a time."""
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[nN]a[nN]"
+_NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?|[nN]a[nN]"
 _MARKS = frozenset('"[({')
 _GROUP = re.compile(r'"[^"]*"|\[[^\[\]]*\]|\([^()]*\)|\{[^{}]*\}')
 _INSIDE: Mapping[str | None, re.Pattern[str]] = {None: re.compile(r"\s+"), **{mark: re.compile(mark) for mark in ";\t,"}}
-_BETWEEN = re.compile(r"\s*[,;\s]\s*")
+_BETWEEN = re.compile(r"\s*[,;]\s*|\s+")
 _LIST = re.compile(
-    rf"(?:[A-Za-z_]\w{{0,19}})?[\[({{]{{0,2}}\s*((?:{_NUMBER})(?:\s*[,;\s]\s*(?:{_NUMBER})){{2,15}})\s*[\])}}]{{0,2}}"
+    rf"(?:[A-Za-z_]\w{{0,19}})?[\[({{]{{0,2}}\s*((?:{_NUMBER})(?:(?:\s*[,;]\s*|\s+)(?:{_NUMBER})){{2,15}})\s*[\])}}]{{0,2}}"
 )
 _CLOCK = re.compile(r"(\d{1,2}):(\d\d):(\d\d(?:\.\d+)?)")
 _DATED = re.compile(r"\d{4}[-/]\d\d[-/]|\d{1,2}:\d\d:|\d{1,2}[ -][A-Za-z]{3}[ -]\d{4}")
@@ -145,7 +147,9 @@ def cells(line: str, separator: str | None) -> list[list[str]]:
 
 def list_numbers(text: str) -> list[str]:
     """Return the numbers of a text that is a list of three numbers or more; [] for another text."""
-    return _BETWEEN.split(match[1].strip()) if (match := _LIST.fullmatch(text)) else []
+    if len(text) > LONGEST_LIST or not (match := _LIST.fullmatch(text)):
+        return []
+    return _BETWEEN.split(match[1].strip())
 
 
 def read_date(text: str) -> float:
