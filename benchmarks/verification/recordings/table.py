@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -22,10 +23,13 @@ from .attitudes import convert, find_flips
 from .columns import choose
 from .digits import find_digits
 from .formats import open_table
+from .formats.table import Table
 from .layout import Layout, Options
 from .rows import Cleaner
-from .units import find_units, guess_time
+from .units import find_units, guess_time, open_readings
 
+SAMPLE = 400
+"""Number of rows that decide between columns, where names leave a choice."""
 ROWS = 2000
 """Smallest number of rows that are kept for fits, evenly chosen; up to twice as many."""
 
@@ -35,7 +39,8 @@ class Recording:
     """A recorded motion at times t (n,), s, of the file; it has `rows` rows, of which n are kept for fits.
 
     `unit_errors` (n,) are measured before attitudes are repaired: norms of quaternions minus 1, or |R'R - 1| of matrices.
-    `order_known` is False if the order of quaternions is a guess. `digits` are the largest round-off of times, s, attitudes,
+    `readings` are recordings of the same rows in all orders of quaternions and units, if no name has them, this one first;
+    the motion of the scene decides. `digits` are the largest round-off of times, s, attitudes,
     rad, and rates, rad/s, that the digits in the file stand for. `path` is None for a motion that is not a file. `numbers` (n,)
     are rows in the file, from 1, `flipped` (n,) is True in rows in which the quaternion changes its sign, `left_out` has the
     numbers of rows that were left out by reason, and `empty_at_end` is the number of rows without numbers at the end. `others`
@@ -45,7 +50,7 @@ class Recording:
     t: Array
     data: States
     unit_errors: Array | None = None
-    order_known: bool = True
+    readings: Sequence[Recording] = ()
     degrees: bool = False
     rows: int = 0
     digits: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -71,9 +76,8 @@ class Recording:
         if self.empty_at_end:
             return f"The last {self.empty_at_end} rows have no numbers, so the file does not show the end of its motion"
         for other in self.others:
-            allowed = other.allowed(self.digits[1]) if error is None else error
-            if not other.difference <= allowed:
-                return f"{', '.join(other.names)} are {other.text}, and not the attitude that is compared. --columns decides"
+            if not other.difference <= (other.allowed if error is None else error):
+                return f"{', '.join(other.names)} are {other.text}, and not the one that is compared. --columns decides"
         return self.layout.doubt
 
     def stream(self) -> Iterator[tuple[Array, States, Array | None, Any]]:
@@ -114,7 +118,7 @@ def _read(path: Path, options: Options) -> tuple[Recording, dict[str, BadInput]]
     if start is not None and end is not None and not start < end:
         raise BadInput("until", f"{end:g}, not after {start:g} s", "a time after the first one, s")
     table = open_table(path)
-    layout = choose(path, Layout(table.names), options)
+    layout = choose(path, Layout(table.names), options, partial(_sample, table))
     if options.world and layout.used["rates"] and layout.attitude is None:
         raise BadInput(
             "rates", f"'world', for {path.name} without attitudes", "body, or a file with attitudes to convert the rates"
@@ -124,7 +128,7 @@ def _read(path: Path, options: Options) -> tuple[Recording, dict[str, BadInput]]
         options = replace(options, quaternion=None)
     cleaner, kept, numbers = Cleaner(path, layout, options), list[Array](), list[Array]()
     every, rows, first, last = 1, 0, True, math.nan
-    extra = [name for part in layout.also.values() for name in part]
+    extra = [name for _, part in layout.also for name in part]
     # The time, then the columns of rates and attitudes; `extra` follows.
     width = 1 + sum(map(len, [*layout.used.values()][1:]))
     for chunk in table.rows([*layout.columns, *extra]):
@@ -133,7 +137,7 @@ def _read(path: Path, options: Options) -> tuple[Recording, dict[str, BadInput]]
         values, at = cleaner.continue_times(chunk)
         if first and len(values):
             usable = ~np.any([*cleaner.bad(values[:, :width]).values()], axis=0)
-            find_units(path, values[usable, :width], layout, options)
+            find_units(values[usable, :width], layout, options)
             first = False
         values, at = cleaner.choose(values, at)
         # Every `every`-th row of the file, counted over all chunks.
@@ -149,26 +153,36 @@ def _read(path: Path, options: Options) -> tuple[Recording, dict[str, BadInput]]
     raw = np.concatenate(kept)
     if (duration := float(last - raw[0, 0]) * float(layout.sizes[0])) < SMALLEST:
         raise BadInput("run", f"{path} with rows within {duration:g} s", f"times that differ by {SMALLEST:g} s or more")
-    t, data, unit_errors = convert(raw[:, :width] * layout.sizes, layout, options)
     layout.notes += cleaner.notes
-    recording = Recording(
-        t,
-        data,
-        unit_errors,
-        order_known=options.quaternion is not None or not layout.numbered,
-        degrees=any(abs(size - math.pi / 180) < 1e-6 for size in layout.used["rates"].values()),
-        rows=rows,
-        digits=find_digits(raw[:, :width], layout),
-        layout=layout,
-        options=options,
-        path=path,
-        numbers=np.concatenate(numbers),
-        flipped=find_flips(raw[:, :width], layout),
-        left_out={reason: count for reason, count in cleaner.left_out.items() if count},
-        empty_at_end=cleaner.empty_at_end,
-        others=compare_others(data[0], raw[:, width:], layout, options),
-    )
+
+    def make(layout: Layout, options: Options) -> Recording:
+        t, data, unit_errors = convert(raw[:, :width] * layout.sizes, layout, options)
+        digits = find_digits(raw[:, :width], layout)
+        return Recording(
+            t,
+            data,
+            unit_errors,
+            degrees=any(abs(size - math.pi / 180) < 1e-6 for size in layout.used["rates"].values()),
+            rows=rows,
+            digits=digits,
+            layout=layout,
+            options=options,
+            path=path,
+            numbers=np.concatenate(numbers),
+            flipped=find_flips(raw[:, :width], layout),
+            left_out={reason: count for reason, count in cleaner.left_out.items() if count},
+            empty_at_end=cleaner.empty_at_end,
+            others=compare_others(data, digits, raw[:, width:], layout, options),
+        )
+
+    recordings = [make(*reading) for reading in open_readings(layout, options)]
+    recording = recordings[0] if len(recordings) < 2 else replace(recordings[0], readings=recordings)
     return recording, unused
+
+
+def _sample(table: Table, names: Sequence[str]) -> Array:
+    """Return the first rows of columns."""
+    return next(table.rows(names), np.empty((0, len(names))))[:SAMPLE]
 
 
 def _unused(layout: Layout, options: Options) -> dict[str, BadInput]:
