@@ -23,6 +23,7 @@ from ..explanation import Explanation
 from ..finding import Cause, Finding, Verdict, Verification, uncapitalised
 from ..mistakes import BY_KEY
 from .comparison import MOST_NOISE, Comparison, compare, prepare
+from .describe import at_rest, only_noise, unseen
 from .table import Recording
 
 ACCURATE, ACCURATE_SINGLE = 1e-6, 1e-4
@@ -35,6 +36,19 @@ FAR = 0.05
 HIDDEN = (
     "The motion multiplies the digits or the noise of the first row to the size of the error. More digits, a shorter file "
     "(--until), or --start scene decide"
+)
+
+RESTING = (
+    "The body is at rest in all rows, and the scene starts with {rate:.3g} rad/s, so that the file does not show its motion. "
+    "--start scene decides"
+)
+FAR_APART = (
+    "The body turns by {angle:.2g} rad from row to row, so that the digits of the first row decide where it is in all others. "
+    "Closer rows decide, or the unit of the time in the header, such as time (ms)"
+)
+NOISE_ONLY = (
+    "The rows are noise as large as their motion, as of a body at rest, and show no motion. Rows of a motion, or --error, "
+    "decide"
 )
 
 
@@ -173,26 +187,35 @@ def verify_recording(
     shaped, explained = comparison.shape[0] <= shape_allowed, Diagnosis()
     if comparison.outliers and not comparison.passed:
         explained = Diagnosis([_single_rows(comparison)])
-    elif not comparison.passed:
+    elif not comparison.passed and not (error is None and only_noise(comparison.case)):
         tell("explain")
         whole = replace(comparison.case, growth=comparison.parts[0].growth)
         explained = diagnose(whole, recording.layout.attitude in (None, "quaternion"), tell)
     # Numbers that are fitted to rows that a start can explain as well prove nothing.
-    hidden = not (comparison.passed or comparison.outliers) and error is None and comparison.case.hidden()
+    decided = comparison.passed or comparison.outliers or comparison.case.far
+    hidden = not decided and error is None and comparison.case.hidden()
     proven = [explanation for explanation in explained.named if explanation.explains and not (hidden and explanation.numbers)]
     verdict, doubt = Verdict.WRONG, ""
     if comparison.passed and shaped:
         verdict, doubt = Verdict.RIGHT, comparison.undecided or recording.doubt(error)
+        if from_row and at_rest(comparison.case) and scene.w_WB_B0.any():
+            doubt = doubt or RESTING.format(rate=float(np.linalg.norm(scene.w_WB_B0)))
     elif error is None and shaped and not proven:
         doubt = HIDDEN if hidden else _doubt(comparison.case, comparison.errors, rows.resolved, recording)
     verdict = Verdict.UNDECIDED if doubt else verdict
     case = comparison.case
     # With noise, the fit shows how well the recording determines the moments.
-    if verdict is Verdict.RIGHT and case.noise.max() > 1e-6 and case.scene.free and case.scene.body.rotor_momentum is None:
+    if (
+        verdict is Verdict.RIGHT
+        and not case.far
+        and case.noise.max() > 1e-6
+        and case.scene.free
+        and case.scene.body.rotor_momentum is None
+    ):
         tell("moments")
         fit = fit_moments(case)
         notes += [f"{fit.sentence}."] * bool((np.array(fit.left) <= case.allowed).all())
-    notes += explained.notes
+    notes += [*explained.notes, *(unseen(case) if verdict is Verdict.RIGHT else [])]
     if len(comparison.parts) > 1:
         notes.append(
             f"The exact motion starts again in {len(comparison.parts) - 1} rows: it multiplies the rounding of a row too much."
@@ -281,6 +304,10 @@ def _single_rows(comparison: Comparison) -> Explanation:
 
 def _doubt(case: Compared, errors: Array, resolved: Array, recording: Recording) -> str:
     """Return the sentence on the data that would decide, if errors may be harmless; "" if they are wrong."""
+    if case.far:
+        return FAR_APART.format(angle=case.gap)
+    if only_noise(case):
+        return NOISE_ONLY
     single = max(recording.digits[1:]) > 1e-9  # fewer than nine digits
     if errors.max() <= (ACCURATE_SINGLE if single else ACCURATE) and errors.max() > case.allowed.min():
         return (
