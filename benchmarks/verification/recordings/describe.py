@@ -70,8 +70,8 @@ class Survey:
         self.first = float(t[0]) if not self.rows else self.first
         self.last, self.rows = float(t[-1]), self.rows + len(t)
 
-    def describe(self, unit: float, digits: tuple[float, float, float], left_out: Mapping[str, int]) -> Description:
-        """Return the description; `unit` is the unit of the time, s."""
+    def describe(self, unit: float) -> Description:
+        """Return the description of the rows and their times; `unit` is the unit of the time, s."""
         mean = self.total / self.steps if self.steps else math.nan
         jitter = math.sqrt(max(self.squares / self.steps - mean * mean, 0.0)) if self.steps > 1 else 0.0
         step = self.typical + mean if self.steps else self.typical
@@ -85,8 +85,6 @@ class Survey:
             self.longest * unit,
             self.sign_changes,
             jitter * unit,
-            digits,
-            left_out=left_out,
         )
 
 
@@ -141,7 +139,7 @@ class Description:
         kinds += [("rates", rates, self.noise[1], self.digits[2], scale, unit, size)]
         values = []
         for name, there, noise, digits, largest, of, factor in kinds:
-            if there and noise > digits:
+            if there and noise > max(digits, DOUBLE * largest):
                 values.append(f"{name} with noise of {number(noise * factor)} {of} in each axis")
             elif there and digits > DOUBLE * largest:
                 values.append(f"{name} rounded to {number(2 * digits * factor, 1)} {of}")

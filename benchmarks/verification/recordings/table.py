@@ -20,6 +20,7 @@ from ..solution import States
 from .also import Other, compare_others
 from .attitudes import convert
 from .columns import choose
+from .describe import Description, Survey
 from .digits import find_digits
 from .formats import open_table
 from .layout import Layout, Options
@@ -38,7 +39,7 @@ class Recording:
     `order_known` is False if the order of quaternions is a guess. `digits` are the largest round-off of times, s, attitudes,
     rad, and rates, rad/s, that the digits in the file stand for. `path` is None for a motion that is not a file. `numbers` (n,)
     are rows in the file, from 1, `left_out` has the numbers of rows that were left out by reason, and `empty_at_end` is the
-    number of rows without numbers at the end. `others` are attitudes in other columns.
+    number of rows without numbers at the end. `others` are attitudes in other columns. `surveyed` describes the rows of a file.
     """
 
     t: Array
@@ -55,6 +56,7 @@ class Recording:
     left_out: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
     empty_at_end: int = 0
     others: Sequence[Other] = ()
+    surveyed: Description | None = None
 
     def label(self, text: str) -> str:
         """Return a description of rows after the name of the file."""
@@ -63,6 +65,14 @@ class Recording:
     def number(self, row: Any) -> int:
         """Return the number in the file, from 1, of a row that is kept."""
         return int(row) + 1 if self.numbers is None else int(self.numbers[row])
+
+    def describe(self, noise: tuple[float, float]) -> Description:
+        """Return what the recording is; `noise` is the deviation of one axis of attitudes, rad, and of rates, rad/s."""
+        surveyed = self.surveyed
+        if surveyed is None:
+            (survey := Survey()).add(self.t, np.empty((len(self.t), 0)))
+            surveyed = survey.describe(1.0)
+        return replace(surveyed, digits=self.digits, noise=noise, left_out=self.left_out)
 
     def doubt(self, error: float | None) -> str:
         """Return the sentence on parts of the file that were not compared, or differ from the compared ones; "" without any."""
@@ -120,7 +130,7 @@ def _read(path: Path, options: Options) -> tuple[Recording, dict[str, BadInput]]
     unused = _unused(layout, options)
     if "quaternion" in unused:  # named columns have their order
         options = replace(options, quaternion=None)
-    cleaner, kept, numbers = Cleaner(path, layout, options), list[Array](), list[Array]()
+    cleaner, survey, kept, numbers = Cleaner(path, layout, options), Survey(), list[Array](), list[Array]()
     every, rows, first, last = 1, 0, True, math.nan
     extra = [name for part in layout.also.values() for name in part]
     # The time, then the columns of rates and attitudes; `extra` follows.
@@ -134,6 +144,7 @@ def _read(path: Path, options: Options) -> tuple[Recording, dict[str, BadInput]]
             find_units(path, values[usable, :width], layout, options)
             first = False
         values, at = cleaner.choose(values, at)
+        survey.add(values[:, 0], values[:, width - 4 : width] if layout.attitude == "quaternion" else values[:, :0])
         # Every `every`-th row of the file, counted over all chunks.
         kept.append(values[-rows % every :: every])
         numbers.append(at[-rows % every :: every])
@@ -164,6 +175,7 @@ def _read(path: Path, options: Options) -> tuple[Recording, dict[str, BadInput]]
         left_out={reason: count for reason, count in cleaner.left_out.items() if count},
         empty_at_end=cleaner.empty_at_end,
         others=compare_others(data[0], raw[:, width:], layout, options),
+        surveyed=survey.describe(float(layout.sizes[0])),
     )
     return recording, unused
 

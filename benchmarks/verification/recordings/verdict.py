@@ -23,7 +23,7 @@ from ..explanation import Explanation
 from ..finding import Cause, Finding, Verdict, Verification, uncapitalised
 from ..mistakes import BY_KEY
 from .comparison import MOST_NOISE, Comparison, compare, prepare
-from .describe import at_rest, only_noise, unseen
+from .describe import Description, at_rest, only_noise, unseen
 from .table import Recording
 
 ACCURATE, ACCURATE_SINGLE = 1e-6, 1e-4
@@ -81,14 +81,16 @@ class Details:
 
     Attributes
     ----------
+    description
+        What the recording is: its rows, times, digits and noise.
     error, allowed, by, noise
         Largest errors, the allowed ones, what allows them, and the noise of one axis.
     digits
         Largest rounding of times, s, attitudes, rad, and rates, rad/s, by the digits of the file.
     first_row
         Errors of the motion that starts exactly in the first row, if a fitted start has smaller ones; else 0.
-    units
-        Units in which attitudes and rates are shown.
+    units, scale
+        Units in which attitudes and rates are shown, and the largest rate, rad/s.
     compared, in_file
         Numbers of rows.
     used
@@ -109,6 +111,7 @@ class Details:
         Times (n,), s, and values (n,) of each quantity at them.
     """
 
+    description: Description
     error: tuple[float, float]
     allowed: tuple[float, float]
     by: tuple[str, str]
@@ -116,6 +119,7 @@ class Details:
     digits: tuple[float, float, float]
     first_row: tuple[float, float]
     units: tuple[Unit, Unit]
+    scale: float
     compared: int
     in_file: int
     used: Mapping[str, Sequence[str]]
@@ -131,6 +135,12 @@ class Details:
     def show(self, errors: Sequence[float]) -> str:
         """Return errors of attitudes and rates, as far as the recording has them, in their units."""
         return " and ".join(unit.show(error) for error, unit in zip(errors, self.units, strict=True) if unit.size)
+
+    @property
+    def lines(self) -> tuple[str, str]:
+        """Two sentences on what the recording is: on rows and times, and on digits and noise."""
+        attitudes, rates = self.units
+        return self.description.lines(bool(attitudes.size), bool(rates.size), self.scale, rates.name == "deg/s")
 
     @property
     def worse(self) -> int:
@@ -226,6 +236,7 @@ def verify_recording(
     limits = [size * x for (_, size), x in zip(units, case.allowed.tolist(), strict=True) if size]
     largest = comparison.worst.max(axis=1)
     details = Details(
+        description=recording.describe((float(rows.noise[0]), float(rows.noise[1]) * case.scale)),
         error=_pair(largest),
         allowed=_pair(case.allowed),
         by=rows.allowed.by,
@@ -233,6 +244,7 @@ def verify_recording(
         digits=recording.digits,
         first_row=_pair(comparison.alone),
         units=units,
+        scale=case.scale,
         compared=comparison.compared,
         in_file=recording.rows + sum(recording.left_out.values()),
         used={kind: tuple(part) for kind, part in recording.layout.used.items() if part},
