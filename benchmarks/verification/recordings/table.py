@@ -24,7 +24,7 @@ from .describe import Description, Survey
 from .digits import find_digits
 from .formats import open_table
 from .layout import Layout, Options
-from .rows import Cleaner
+from .rows import FEW, OTHER_CLOCK, Cleaner
 from .units import find_units, guess_time
 
 ROWS = 2000
@@ -39,7 +39,8 @@ class Recording:
     `order_known` is False if the order of quaternions is a guess. `digits` are the largest round-off of times, s, attitudes,
     rad, and rates, rad/s, that the digits in the file stand for. `path` is None for a motion that is not a file. `numbers` (n,)
     are rows in the file, from 1, `left_out` has the numbers of rows that were left out by reason, and `empty_at_end` is the
-    number of rows without numbers at the end. `others` are attitudes in other columns. `surveyed` describes the rows of a file.
+    number of rows without numbers at the end. `clock` is the number of the clock, if it was set back.
+    `others` are attitudes in other columns. `surveyed` describes the rows of a file.
     """
 
     t: Array
@@ -55,6 +56,7 @@ class Recording:
     numbers: Any = None
     left_out: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
     empty_at_end: int = 0
+    clock: int = 0
     others: Sequence[Other] = ()
     surveyed: Description | None = None
 
@@ -78,6 +80,8 @@ class Recording:
         """Return the sentence on parts of the file that were not compared, or differ from the compared ones; "" without any."""
         if self.empty_at_end:
             return f"The last {self.empty_at_end} rows have no numbers, so the file does not show the end of its motion"
+        if (others := self.left_out.get(OTHER_CLOCK, 0)) > FEW * (self.rows + others):
+            return f"The clock was set back, and {others:,} rows are not compared. A file for each clock decides"
         for other in self.others:
             allowed = other.allowed(self.digits[1]) if error is None else error
             if not other.difference <= allowed:
@@ -90,7 +94,7 @@ class Recording:
             numbers = 1 + np.arange(len(self.t)) if self.numbers is None else self.numbers
             yield self.t, self.data, self.unit_errors, numbers
             return
-        cleaner = Cleaner(self.path, self.layout, self.options)
+        cleaner = Cleaner(self.path, self.layout, self.options, keep=self.clock)
         for values in open_table(self.path).rows(self.layout.columns):
             chosen, numbers = cleaner.choose(*cleaner.continue_times(values))
             if len(chosen):
@@ -114,8 +118,11 @@ def read_all(paths: Sequence[Path], options: Options) -> list[Recording]:
     return [recording for recording, _ in made]
 
 
-def _read(path: Path, options: Options) -> tuple[Recording, dict[str, BadInput]]:
-    """Return the motion in a file, and the errors of options that it does not use."""
+def _read(path: Path, options: Options, clock: int = 0) -> tuple[Recording, dict[str, BadInput]]:
+    """Return the motion in a file, and the errors of options that it does not use.
+
+    If the clock was set back, rows of one `clock` are compared: those of the clock with the most rows.
+    """
     if options.euler is not None and not re.fullmatch("(?!.*(.)\\1)[xyz]{3}", options.euler):
         raise BadInput("euler", repr(options.euler), "three of the letters x, y, z without equal neighbours, such as zyx")
     start, end = options.start_time, options.end_time
@@ -127,14 +134,13 @@ def _read(path: Path, options: Options) -> tuple[Recording, dict[str, BadInput]]
         raise BadInput(
             "rates", f"'world', for {path.name} without attitudes", "body, or a file with attitudes to convert the rates"
         )
-    unused = _unused(layout, options)
+    original, unused = options, _unused(layout, options)
     if "quaternion" in unused:  # named columns have their order
         options = replace(options, quaternion=None)
-    cleaner, survey, kept, numbers = Cleaner(path, layout, options), Survey(), list[Array](), list[Array]()
+    cleaner, survey, kept, numbers = Cleaner(path, layout, options, keep=clock), Survey(), list[Array](), list[Array]()
     every, rows, first, last = 1, 0, True, math.nan
     extra = [name for part in layout.also.values() for name in part]
-    # The time, then the columns of rates and attitudes; `extra` follows.
-    width = 1 + sum(map(len, [*layout.used.values()][1:]))
+    width = cleaner.width  # `extra` follows
     for chunk in table.rows([*layout.columns, *extra]):
         if first and len(chunk):
             guess_time(chunk, layout)
@@ -152,6 +158,9 @@ def _read(path: Path, options: Options) -> tuple[Recording, dict[str, BadInput]]
         while sum(map(len, kept)) > 2 * ROWS:
             kept, numbers, every = [np.concatenate(kept)[::2]], [np.concatenate(numbers)[::2]], 2 * every
         last = values[-1, 0] if len(values) else last
+    cleaner.finish()
+    if cleaner.pieces and (longest := max(cleaner.pieces, key=lambda piece: (cleaner.pieces[piece], -piece))) != clock:
+        return _read(path, original, longest)
     if rows < 2:
         left = "".join(f", and {count} {reason}" for reason, count in cleaner.left_out.items() if count)
         raise BadInput("run", f"{path} with {rows} rows{left}", "a header and two rows or more")
@@ -174,6 +183,7 @@ def _read(path: Path, options: Options) -> tuple[Recording, dict[str, BadInput]]
         numbers=np.concatenate(numbers),
         left_out={reason: count for reason, count in cleaner.left_out.items() if count},
         empty_at_end=cleaner.empty_at_end,
+        clock=clock,
         others=compare_others(data[0], raw[:, width:], layout, options),
         surveyed=survey.describe(float(layout.sizes[0])),
     )

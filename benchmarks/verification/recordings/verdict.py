@@ -24,6 +24,7 @@ from ..finding import Cause, Finding, Verdict, Verification, uncapitalised
 from ..mistakes import BY_KEY
 from .comparison import MOST_NOISE, Comparison, compare, prepare
 from .describe import Description, at_rest, only_noise, unseen
+from .rows import OUTSIDE, REPEATED
 from .table import Recording
 
 ACCURATE, ACCURATE_SINGLE = 1e-6, 1e-4
@@ -290,10 +291,12 @@ def _reason(finding: Finding, details: Details, proven: Sequence[Explanation]) -
     """Return the reason of the verdict: the errors, the allowed errors, and the mistakes with the errors that they leave."""
     allowed = details.show(details.allowed)
     verb = "are" if all(unit.size for unit in details.units) else "is"
+    left = sum(count for reason, count in details.description.left_out.items() if reason not in (OUTSIDE, REPEATED))
     decided = [
         f"its largest error is {details.show(details.error)}",
         f"{allowed} {verb} allowed by {'--error' if finding.by == 'error' else f'its {finding.by}'}",
         *([details.shape] if details.shape else []),
+        *([f"{left:,} of {details.in_file:,} rows are left out"] if 2 * left > details.in_file else []),
     ]
     causes = [
         uncapitalised(explanation.sentence) + (f" (leaves {details.show(explanation.left)})" if max(explanation.plain) else "")
