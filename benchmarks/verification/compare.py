@@ -270,6 +270,16 @@ class Compared:
         """The angle, rad, by which the body may have turned."""
         return float(self.t[-1] - self.start) * self.scale
 
+    @property
+    def gap(self) -> float:
+        """The angle, rad, by which the body turns from row to row."""
+        return float(np.median(np.diff(self.t))) * self.scale
+
+    @property
+    def far(self) -> bool:
+        """Whether the body turns by more from row to row than trial motions do in all."""
+        return self.gap > NUMERICAL
+
     @cached_property
     def plain(self) -> Array:
         """The errors (2, n) without a mistake: from the first row, or from a start that is fitted if it has noise."""

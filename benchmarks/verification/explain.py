@@ -50,6 +50,8 @@ NEARLY, SMALL_SHARE, REFINED = 1e-2, 1e-6, 2
 number for slopes, and the number of such fits."""
 DRIFTING_ROWS, DRIFTING_EFFORT, MOST_FITS = 300, 30, 20
 """Rows from which a drift is fitted, the work of a fit, and the largest number of its iterations."""
+FROZEN = "frozen motion"
+"""Key of a mistake that no fitted number explains better."""
 _INERTIA = [f"inertia_{ij}" for ij in (11, 12, 13, 22, 23, 33)]
 ALL_KINDS = frozenset({"readings", "times", "scenes", "equations", "attitudes", "habits", "rows", "steps", "bodies"})
 PROGRAM_KINDS = frozenset({"readings", "times", "scenes", "equations", "attitudes", "habits"})
@@ -88,7 +90,7 @@ def diagnose(
     early = whole.first(LONGEST, FEWEST).change(effort=case.effort)
     tried, over = list[Explanation](), False
     for name, search in SEARCHES.items():
-        if not kinds & search.kinds or len(case.t) < search.least:
+        if not kinds & search.kinds or len(case.t) < search.least or (whole.far and not search.whole):
             continue
         tell(name)
         case.effort.left = max(case.effort.left, 0.0) + EFFORT * search.share  # unused work is kept
@@ -98,7 +100,8 @@ def diagnose(
             if case.effort.over:
                 over = True
                 break
-        if search.ends and any(explanation.explains for explanation in tried):
+        found = [explanation.keys for explanation in tried if explanation.explains]
+        if found and (search.ends or (FROZEN,) in found):
             break  # the searches that follow take longer and fit more numbers
     bounds = np.maximum(case.plain.max(axis=1), case.allowed)
 
@@ -114,6 +117,8 @@ def diagnose(
         tried, explaining = [replace(explanation, explains=False) for explanation in tried], []
     if not explaining:
         notes = ["The search ended before everything was tried: it takes too many trial motions."] * over
+        if whole.far:
+            notes.append("No trial motion reaches the second row, so that only units of the time are tried.")
         if (corners := len(case.scene.breaks)) > MOST_BREAKS:
             notes.append(f"Other bodies, axes and damping are not fitted: the loads have {corners} jumps and corners.")
         return Diagnosis([explanation for explanation in tried if explanation.share < HALF][:3], tried, notes)
@@ -193,7 +198,8 @@ def _readings(case: Compared, asked: _Asked) -> Explanations:
         R, w = motion(near.scene.R_WB0[None], near.scene.w_WB_B0[None], np.zeros((1, 0)), len(near.t))
         # A reading that makes the first rows much worse than they are is not tried on all rows.
         if (near.errors(R[0], w[0]) <= 2 * case.error[:, :10].max() + 10 * case.allowed.max()).all():
-            yield attempt(case, trial)
+            explanation = attempt(case, trial)
+            yield explanation if _moves(case, explanation) else None
 
 
 def _changes(case: Compared, asked: _Asked) -> Explanations:
@@ -530,7 +536,11 @@ def _standstill(case: Compared, mistake: Standstill) -> Explanation | None:
     going = np.flatnonzero(moved > STILL)
     k = int(going[-1]) + 1 if len(going) else 0
     rest = w is None or bool(np.abs(w[k:]).max() <= STILL * case.scale)
-    if len(case.t) - k < 3 or (w is not None and mistake.rest != (0.0 if rest else 1.0)) or (w is None and mistake.rest):
+    if (
+        len(case.t) - k < 3
+        or (w is not None and mistake.rest != (0.0 if rest else 1.0))
+        or (w is None and mistake.rest and not mistake.from_start)
+    ):
         return None
     start = _still(case)
     stays_at_start = R is not None and k == 0 and case.apart((np.broadcast_to(R[0], R.shape), start[1]), start)[0] <= STILL

@@ -118,7 +118,11 @@ def _begin(scene: Scene, recording: Recording, from_row: bool) -> tuple[Scene, A
     if first < 0 and (timed or not from_row):
         raise BadInput("run", recording.label(f"a first row at {first:g} s"), "times of the scene, from 0 on")
     if timed:  # its loads need values in all rows
-        scene = scene.rename(scene.name, t_end=max(scene.t_end, float(t[-1])))
+        try:
+            scene = scene.rename(scene.name, t_end=max(scene.t_end, float(t[-1])))
+        except BadInput as short:
+            got = recording.label(f"rows until {t[-1]:g} s, and {short.argument}: {short.got}")
+            raise BadInput("run", got, f"rows within the table (--until), or {short.allowed}") from None
     elif from_row:  # sums of steps and a large time would lose digits
         t = t - first
     if from_row:
@@ -180,7 +184,8 @@ def _rounded(recording: Recording, t: Array, rates: Array, scale: float) -> Arra
     time, attitude, rate = recording.digits
     w, acceleration = recording.data[1], 0.0
     if w is not None:
-        slopes = np.linalg.norm(np.diff(w, axis=0), axis=1) / np.diff(t)
+        # Where the body turns by more than 1 rad from row to row, rates have changed by more than the rows show.
+        slopes = np.linalg.norm(np.diff(w, axis=0), axis=1) * np.maximum(1 / np.diff(t), scale)
         acceleration = float(slopes[rates[1:] <= 10 * scale].max(initial=0.0))
     if rate <= 2.0**-52 * rates.max():  # double precision is relative to each row
         rate = min(rate, 2.0**-53 * scale)
@@ -243,9 +248,8 @@ class Comparison:
 def compare(case: Compared, recording: Recording, from_row: bool) -> Comparison:
     """Compare the rows that are kept for fits, and if they agree, all rows of the file."""
     undecided, shift = "", float(recording.t[0] - case.t[0])
-    gap = float(np.median(np.diff(case.t))) * case.scale
-    if not has_closed_form(case.scene) and gap > NUMERICAL / 10:
-        got = f"rows between which the body turns by {gap:.2g} rad"
+    if not has_closed_form(case.scene) and case.gap > NUMERICAL / 10:
+        got = f"rows between which the body turns by {case.gap:.2g} rad"
         raise BadInput("run", recording.label(got), "closer rows, or the unit of the time in the header, such as time (ms)")
     if not has_closed_form(case.scene) and len(near := case.first(NUMERICAL, 2).t) < len(case.t):
         case = case.take(slice(0, len(near)))
@@ -275,11 +279,11 @@ def _stretches(case: Compared, from_row: bool) -> tuple[list[Compared], str, Arr
     whole = all(x is not None for x in case.data) or (case.data[1] is not None and case.scene.free)
     while True:
         end = len(rest.t)
-        if from_row and whole and end > 2:
+        if from_row and whole and end > 2 and not case.far:
             end, growth = _reach(rest)
             rest = replace(rest, growth=growth)
         part = rest.take(slice(0, end))
-        if part.free and not part.passes(part.error) and _near(part):
+        if part.free and not case.far and not part.passes(part.error) and _near(part):
             alone = np.maximum(alone, part.error.max(axis=1))
             initial, _, _ = part.fit(exact(part), np.zeros(0), np.zeros(0))
             fitted = part.at(initial)
@@ -297,7 +301,7 @@ def _stretches(case: Compared, from_row: bool) -> tuple[list[Compared], str, Arr
         changes = {name: x[0] for name, x in zip(("R_WB0", "w_WB_B0"), rest.data, strict=True) if x is not None}
         rest = replace(rest, scene=rest.scene.rename(rest.scene.name, **changes), start=float(rest.t[0]))
     part = parts[0]
-    if from_row and not whole and len(parts) == 1 and not part.passes(part.error) and len(part.t) > 3:
+    if from_row and not whole and not case.far and len(parts) == 1 and not part.passes(part.error) and len(part.t) > 3:
         guessed = replace(part, free=tuple(range(6)))
         initial, _, _ = guessed.fit(exact(guessed), np.zeros(0), np.zeros(0))
         guessed = replace(guessed.at(initial), free=part.free)
