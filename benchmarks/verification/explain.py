@@ -18,7 +18,7 @@ from .compare import LINEAR, LONGEST, NUMERICAL, Compared, Effort, Solution, exa
 from .explanation import HALF, PROVEN, Explanation, Trial, attempt, explain
 from .find_steps import PARTS, STEPS_AT_MOST, find_steps
 from .mistakes import BY_KEY
-from .mistakes.attitudes import DRIFTS, RULES, align, integrate
+from .mistakes.attitudes import DRIFTS, RULES, Drift, align, integrate
 from .mistakes.equations import EQUATIONS
 from .mistakes.habits import HABITS, ROWS, STANDSTILLS, Standstill
 from .mistakes.mistake import Number
@@ -27,6 +27,7 @@ from .mistakes.scenes import PARTS as SCENE_PARTS
 from .mistakes.scenes import SCENES, SceneMistake, with_inertia
 from .mistakes.steps import INTEGRATORS
 from .mistakes.times import DROPPED, JITTERED, TIMES
+from .resampled import find_resampled
 from .solution import Equations, has_closed_form, truth
 from .trials import Drifting, by_drift, by_habit, by_rule, compose, fits, remark_on_damping
 
@@ -818,6 +819,7 @@ SEARCHES = {
     "other readings": Search(_readings, frozenset({"readings"}), 0.1, ends=True),
     "axes and sizes of rates": Search(_sensors, frozenset({"readings"}), 0.1),
     "habits": Search(_habits, frozenset({"habits"}), 0.1, least=1),
+    "resampled rows": Search(lambda case, asked: find_resampled(case), frozenset({"rows"}), 0.05, ends=True, whole=True),
     "wrong rows": Search(_rows, frozenset({"rows"}), 0.01, ends=True),
     "other times": Search(_times, frozenset({"times"}), 0.1),
     "fitted numbers": Search(_numbers, frozenset({"scenes", "equations"}), 0.15),
