@@ -215,23 +215,31 @@ def attempt(
     small: float = 1e-6,
     most: int = 8,
     known: Mapping[str, float] = MappingProxyType({}),
+    ranked: bool = False,
 ) -> Explanation | None:
     """Return the explanation by a motion whose initial state and other numbers are fitted as far as they are open.
 
     `start` are the numbers to start with, SI, and `small` is their change for slopes in their units; `most` is the number of
     iterations. Mistakes that explain too little of the first rows are not tried on all. `known` are other numbers of the
-    sentence, which `build` has. None if the mistakes cannot be applied.
+    sentence, which `build` has. None if the mistakes cannot be applied, or cannot explain the first rows to first order, which
+    is not asked again if the mistakes are `ranked` by it.
     """
     if case.screen is not None:
-        explanation = _attempt(case.screen, trial, start, small, most, known)
+        explanation = _attempt(case.screen, trial, start, small, most, known, ranked)
         if explanation is None or (not explanation.explains and explanation.rest > HALF):
             return explanation
         start = [explanation.values[number.name] for number in trial.numbers]
-    return _attempt(case, trial, start, small, most, known)
+    return _attempt(case, trial, start, small, most, known, ranked)
 
 
 def _attempt(
-    case: Compared, trial: Trial, start: Sequence[float] | None, small: float, most: int, known: Mapping[str, float]
+    case: Compared,
+    trial: Trial,
+    start: Sequence[float] | None,
+    small: float,
+    most: int,
+    known: Mapping[str, float],
+    ranked: bool,
 ) -> Explanation | None:
     motion = trial.build(case)
     if motion is None:
@@ -242,9 +250,12 @@ def _attempt(
     def scaled(R: Array, w: Array, p: Array, n: int) -> tuple[Array, Array]:
         return motion(R, w, p * units, n)
 
-    _, p, made = case.change(free=()).fit(scaled, p, np.full(len(p), small), most)
+    small_changes = np.full(len(p), small)
+    if not ranked and not case.may_explain(scaled, p, small_changes):
+        return None
+    _, p, made = case.change(free=()).fit(scaled, p, small_changes, most)
     error = case.errors(*made)
     if case.free and not case.passes(error) and (error.max(axis=1) <= HOPELESS * case.noise * case.growth).any():
-        _, p, made = case.fit(scaled, p, np.full(len(p), small), most)
+        _, p, made = case.fit(scaled, p, small_changes, most)
     names = (number.name for number in trial.numbers)
     return explain(case, trial, made, dict(zip(names, (p * units).tolist(), strict=True)) | dict(known))
