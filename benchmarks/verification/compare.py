@@ -344,7 +344,7 @@ class Compared:
         R, w = self.evaluate(motion, numbers + small * np.vstack([0 * numbers, np.eye(len(numbers))[moved]]))
         d = (self.differences(R, w) / np.repeat(self.noise, [9, 3])).reshape(1 + len(moved), -1)
         slopes, out = (d[1:] - d[0]) / small, np.zeros(len(numbers))
-        out[moved] = np.sqrt(np.diag(np.linalg.pinv(slopes @ slopes.T)))
+        out[moved] = np.sqrt(np.maximum(np.diag(np.linalg.pinv(slopes @ slopes.T)), 0.0))
         return out
 
     def fit(self, motion: Solution, extra: Array, changed: Array, most: int = 8) -> tuple[Array, Array, tuple[Array, Array]]:

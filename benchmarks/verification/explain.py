@@ -28,6 +28,7 @@ from .mistakes.scenes import PARTS as SCENE_PARTS
 from .mistakes.scenes import SCENES, SIZES, SceneMistake, with_inertia
 from .mistakes.steps import INTEGRATORS
 from .mistakes.times import DROPPED, JITTERED, TIMES
+from .resampled import find_resampled
 from .solution import Equations, has_closed_form, integrate_rates, truth
 from .trials import Drifting, by_drift, by_habit, by_rule, compose, fits, remark_on_damping
 
@@ -946,6 +947,7 @@ SEARCHES = {
     "other equations": Search(_changes, frozenset({"scenes", "equations"}), 0.3),
     "other readings": Search(_readings, frozenset({"readings"}), 0.1, ends=True),
     "habits": Search(_habits, frozenset({"habits"}), 0.1, least=1),
+    "resampled rows": Search(lambda case, asked: find_resampled(case), frozenset({"rows"}), 0.05, ends=True, whole=True),
     "wrong rows": Search(_rows, frozenset({"rows"}), 0.01, ends=True),
     "other times": Search(_times, frozenset({"times"}), 0.1),
     "axes and sizes of rates": Search(_sensors, frozenset({"readings"}), 0.1),
