@@ -1,0 +1,186 @@
+"""Verify planted files, and compare the answers with what was decided."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import sys
+import tempfile
+import time
+from collections.abc import Iterable, Iterator
+from multiprocessing import Process
+from pathlib import Path
+from typing import Any
+
+from .files import Planted, plant
+
+BARE = " without normalisation"
+ALIASES: dict[str, tuple[str, ...]] = {
+    "without the rotor": ("size of the rotor",),
+    "without the torque": ("size of the torque",),
+    "without the damping": ("size of the damping",),
+    "without the field": ("size of the field",),
+    "sign of the rotor": ("size of the rotor",),
+    "sign of the torque": ("size of the torque",),
+    "sign of the damping": ("size of the damping",),
+    "sign of the field": ("size of the field",),
+    "factor one half": ("speed of attitudes",),
+    "speed of attitudes": ("factor one half",),
+    "rates in degrees": ("size of the rates",),
+    "rates in radians": ("size of the rates",),
+    "reversed rates": ("size of the rates", "rates in mirrored axes"),
+    "slerp between knots": ("interpolated rows",),
+    "dropped rows": ("jittered times",),
+    "time shift": ("phase drift",),
+    "time in ms": ("phase drift",),
+    "other moments": ("another body",),
+    "another body": ("other moments",),
+    "rate limit per component": ("rate limit",),
+}
+"""Other names that are as true: a part that is missing is one of size 0."""
+LOOSE: dict[str, tuple[str, ...]] = {
+    "no products of inertia": ("another body", "other moments"),
+    "sign of the products of inertia": ("another body", "other moments"),
+    "inverted inertia": ("another body", "other moments"),
+    "first row": ("single rows",),
+    "transposed in some rows": ("some rows", "single rows"),
+    "held rows": ("some rows", "jittered times"),
+}
+"""True statements that do not name the mistake."""
+
+
+def command(made: Planted) -> str:
+    """Return the command that repeats a verification."""
+    words = ["conservative", "verify", f"run{made.ending}", "--body", "scene.toml"]
+    for name, value in made.options.items():
+        words += [f"--{name}", str(value)]
+    return shlex.join(words)
+
+
+def outcome(seed: int, folder: Path) -> dict[str, Any]:
+    """Return the row of a seed: the file, the answer, and the complaint about it."""
+    from conservative.benchmarks.verification.verify import verify
+    from conservative.errors import BadInput
+
+    began = time.process_time()
+    made = plant(seed)
+    path, scene = folder / f"run{made.ending}", folder / "scene.toml"
+    path.write_text(made.text, encoding="utf-8")
+    scene.write_text(made.scene, encoding="utf-8")
+    begun = time.process_time()
+    row: dict[str, Any] = {
+        "seed": seed, "kind": made.kind, "mistake": made.mistake, "layout": made.layout, "noise": made.noise,
+        "expected": made.expected, "identifiable": made.identifiable, "reason": made.reason, "same": sorted(made.same),
+        "size": made.size, "scene": made.about["parts of the scene"], "command": command(made),
+        **{key: made.about.get(key, 0) for key in ("turns", "rows", "shape", "special", "gaps", "nan", "duplicated", "cut")},
+        "grain": made.about["grain"], "per turn": round(made.about["per turn"], 2), "parts": made.about["parts"],
+    }  # fmt: skip
+    try:
+        (found,) = verify([path], scene, **made.options)
+        finding = found.findings[0]
+        row |= {
+            "verdict": str(found.verdict), "reason given": found.reason, "named": [list(cause.keys) for cause in finding.causes],
+            "notes": [*found.notes],
+        }  # fmt: skip
+    except BadInput as error:
+        row |= {"verdict": "refused", "reason given": str(error), "named": [], "notes": []}
+    row["seconds"] = [round(begun - began, 2), round(time.process_time() - begun, 2)]
+    return row | {"complaint": complaint(row)}
+
+
+def bare(key: str) -> str:
+    return key.removesuffix(BARE)
+
+
+def true_names(row: dict[str, Any]) -> set[str]:
+    """Return the names that are true for a file."""
+    own = {row["mistake"], *ALIASES.get(row["mistake"], ()), *LOOSE.get(row["mistake"], ())}
+    others = {name for same in row["same"] for name in (same, *ALIASES.get(same, ()))}
+    return own | others
+
+
+def is_named(row: dict[str, Any]) -> bool:
+    """Return whether the answer names the mistake."""
+    names = {row["mistake"], *ALIASES.get(row["mistake"], ())}
+    return any({bare(key) for key in keys} <= names for keys in row["named"])
+
+
+def complaint(row: dict[str, Any]) -> str:
+    """Return the complaint about the answer to a file, or ""."""
+    if row["verdict"] == "refused":
+        return "refused"
+    if row["expected"] == "right" and row["verdict"] == "wrong":
+        return "right called wrong"
+    if row["expected"] == "wrong" and row["verdict"] == "right":
+        return "wrong called right"
+    true = true_names(row)
+    if row["named"] and not any({bare(key) for key in keys} <= true for keys in row["named"]):
+        return "false name"
+    if row["verdict"] == "undecided" and (row["expected"] == "right" or row["identifiable"]):
+        return "undecided"
+    if row["identifiable"] and not is_named(row):
+        return "not named"
+    return ""
+
+
+def load(path: Path) -> list[dict[str, Any]]:
+    """Return the rows of a file; the last one of a seed counts."""
+    rows = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()] if path.exists() else []
+    return [*{row["seed"]: row for row in rows}.values()]
+
+
+def run(path: Path, seeds: Iterable[int], tell: Any = print) -> Iterator[dict[str, Any]]:
+    """Yield the rows of seeds that `path` does not have, which are verified and appended."""
+    done = {row["seed"] for row in load(path)}
+    with tempfile.TemporaryDirectory() as folder, path.open("a", encoding="utf-8") as stream:
+        for seed in seeds:
+            if seed in done:
+                continue
+            row = outcome(seed, Path(folder))
+            stream.write(json.dumps(row) + "\n")
+            stream.flush()
+            if row["complaint"]:
+                tell(line_of(row))
+            yield row
+
+
+def line_of(row: dict[str, Any]) -> str:
+    """Return a complaint as a line: seed, scene, mistake, expected, answer, seconds."""
+    expected = row["expected"] or "either"
+    names = " or ".join(" + ".join(keys) for keys in row["named"])
+    answer = f"{row['verdict']}: {names or 'no name'}"
+    facts = f"{row['layout']}, {row['noise']}, {row['turns']} turns, {row['rows']} rows"
+    same = f" (or {', '.join(row['same'])})" if row["same"] else ""
+    return (
+        f"{row['seed']} | {row['complaint']} | {row['scene']}; {facts} | {row['mistake']}{same}, {row['size']:.3g} grains | "
+        f"expected {expected}{', named' * row['identifiable']} | said {answer} | {row['seconds'][1]} s"
+    )
+
+
+def work(path: str, seeds: list[int]) -> None:
+    for _ in run(Path(path), seeds, lambda text: print(text, flush=True)):
+        pass
+
+
+def in_processes(path: Path, seeds: list[int], count: int) -> list[dict[str, Any]]:
+    """Return the rows of seeds, verified by some processes; each appends to a file of its own, which `path` gets at the end."""
+    parts = [path.with_suffix(f".{i}.jsonl") for i in range(count)]
+    done = {row["seed"] for part in (path, *parts) for row in load(part)}
+    left = [seed for seed in seeds if seed not in done]
+    workers = [Process(target=work, args=(str(part), left[i::count])) for i, part in enumerate(parts)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()
+    if any(worker.exitcode for worker in workers):
+        raise SystemExit(f"a process ended with {[worker.exitcode for worker in workers]}")
+    rows = {row["seed"]: row for part in (path, *parts) for row in load(part)}
+    path.write_text("".join(json.dumps(row) + "\n" for row in rows.values()), encoding="utf-8")
+    for part in parts:
+        part.unlink(missing_ok=True)
+    return [rows[seed] for seed in seeds]
+
+
+if __name__ == "__main__":
+    file, first, end, *count = sys.argv[1:]
+    in_processes(Path(file), list(range(int(first), int(end))), int((count or ["2"])[0]))
