@@ -9,7 +9,8 @@ whose numbers fit best.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -21,11 +22,18 @@ from .mistakes import ATTITUDES, BOTH, NUMBERS, SCENES, STEPS, integrate, march,
 from .worlds import Draw, World, is_table, scaled
 
 FLOOR, WRONG, IDENTIFIABLE = 1e-9, 3.0, 10.0
-NEAR = 0.3
-"""Largest difference, rad or relative, that is treated to first order."""
+NEAR = 0.2
+"""Largest difference, rad or relative, with which fits begin."""
 FEWEST = 12
+"""Smallest number of rows of a fit."""
 CLOSE = 300.0
-"""Difference, in grains, above which a wrong scene or reading is not taken for a long step."""
+"""Difference, in grains, above which another mistake is not taken for a long step, or for times that scatter."""
+SMALL, MOST = 1e-6, 8
+"""Changes for slopes, and the largest number of steps of a fit."""
+Build = Callable[[Any, Any, int], Any]
+"""From an initial state (7,), numbers (k,) and n to the first rows (n, 7)."""
+FARTHEST = 1.5
+"""Largest number of a fit: radians, or relative."""
 
 
 def differences(Y: Any, Z: Any, scale: float) -> Any:
@@ -39,7 +47,7 @@ def differences(Y: Any, Z: Any, scale: float) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """The rows of a file, without noise, beside the exact motion `E` (n, 7) from the state `y0`; differences are in grains."""
+    """The rows of a file, without noise, and what they should be: the exact motion from `y0`. Differences are in grains."""
 
     world: World
     t: Any
@@ -49,53 +57,92 @@ class Rows:
     grain: Any
     scale: float
     inexact: bool
-    extra: dict[str, Any] = field(default_factory=dict)
 
-    @cached_property
-    def E(self) -> Any:
-        return self.world.solve(self.t, self.y0, self.t[0])
+    def exact(self, y0: Any, n: int, world: World | None = None, late: float = 0.0) -> Any:
+        """Return the first rows of an exact motion from a state in the first row, at times that are later."""
+        return (world or self.world).solve(self.t[:n] + late, y0, self.t[0])
 
     def off(self, Z: Any) -> Any:
-        """Return the differences (n k,) of states from the exact motion."""
-        return (differences(Z, self.E[: len(Z)], self.scale)[:, self.kept] / self.grain).ravel()
+        """Return the differences (n k,) of the first rows from other ones."""
+        return (differences(self.Y[: len(Z)], Z, self.scale)[:, self.kept] / self.grain).ravel()
 
-    @cached_property
-    def d(self) -> Any:
-        """The differences of the file."""
-        return self.off(self.Y)
-
-    @cached_property
-    def start(self) -> list[Any]:
-        """Differences that small changes of the start make, per change of 1; none if the first row is exact."""
-        out = []
-        for k in self.kept if self.inexact else []:
-            e, y = 1e-6, self.y0.copy()
-            if k < 3:
-                y[:4] = motion.times(y[:4], motion.turn(e * np.eye(3)[k]))
-            else:
-                y[k + 1] += e * self.scale
-            out.append(self.off(self.world.solve(self.t, y, self.t[0])) / e)
-        return out
-
-    def left(self, x: Any, *others: Any) -> float:
-        """Return the size of differences that neither the start nor other differences explain."""
-        if many := [column[: len(x)] for column in (*self.start, *others)]:
-            A = np.nan_to_num(np.array(many).T)
-            A = A / np.maximum(np.abs(A).max(axis=0), 1e-300)
-            x = x - A @ np.linalg.lstsq(A, x, rcond=1e-12)[0]
+    def size(self, x: Any) -> float:
+        """Return the root mean square of a row, of attitudes or of rates."""
         square = x.reshape(-1, len(self.kept) // 3, 3) ** 2
         return float(np.sqrt(square.sum(axis=2).mean(axis=0)).max())
 
     @cached_property
+    def d(self) -> Any:
+        """The differences from the exact motion."""
+        return self.off(self.exact(self.y0, len(self.t)))
+
+    @cached_property
     def near(self) -> int:
-        """The number of rows before the differences become too large for first order."""
+        """The number of rows before the differences become large, with which fits begin."""
         far = (np.abs(self.d.reshape(len(self.t), -1) * self.grain) > NEAR).any(axis=1)
         first = int(np.argmax(far)) if far.any() else len(self.t)
-        return len(self.t) if first < FEWEST else first
+        return min(max(first, FEWEST), len(self.t))
 
-    def take(self, n: int) -> Rows:
-        """Return the first rows."""
-        return Rows(self.world, self.t[:n], self.Y[:n], self.y0, self.kept, self.grain, self.scale, self.inexact, self.extra)
+    def moved(self, p: Any) -> Any:
+        """Return the initial state after small changes of what the file shows of it."""
+        y, k = self.y0.copy(), 3 * (0 in self.kept)
+        if k:
+            y[:4] = motion.times(y[:4], motion.turn(p[:3]))
+        if 3 in self.kept:
+            y[4:] = y[4:] + self.scale * p[k : k + 3]
+        return y
+
+    @cached_property
+    def begun(self) -> Any:
+        """Slopes of the differences for changes of the start; none if the first row is exact."""
+        if not self.inexact:
+            return np.zeros((len(self.d), 0))
+        moved = [self.off(self.exact(self.moved(SMALL * v), len(self.t))) - self.d for v in np.eye(len(self.kept))]
+        return np.array(moved).T / SMALL
+
+    def fit(self, numbers: int = 0, build: Build | None = None, goal: float = IDENTIFIABLE) -> float:
+        """Return the size of the differences that a start and some numbers leave, which fit best; early if it is hopeless.
+
+        The fit begins with the first rows, in which differences are small.
+        """
+        free = len(self.kept) * self.inexact
+        p, left = np.zeros(free + numbers), np.inf
+
+        def rows(p: Any, n: int) -> Any:
+            y0 = self.moved(p) if free else self.y0
+            return self.off(self.exact(y0, n) if build is None else build(y0, p[free:], n))
+
+        for n in sorted({self.near, len(self.t)}):
+            x = rows(p, n)
+            left, A = self.size(x), None
+            for _ in range(MOST if len(p) else 0):
+                if left < 0.1 * goal:
+                    break
+                if A is None:
+                    at = len(x)
+                    begun = self.begun[:at] if not p.any() else self.slopes(rows, p, n, range(free), x)
+                    A = np.hstack([begun, self.slopes(rows, p, n, range(free, len(p)), x)])
+                sizes = np.maximum(np.abs(A).max(axis=0), 1e-300)
+                step = np.linalg.lstsq(A / sizes, -x, rcond=1e-11)[0] / sizes
+                if not np.abs(p + step).max() <= FARTHEST:
+                    break
+                y = rows(p + step, n)
+                new = self.size(y)
+                if new < 0.3 * left:
+                    p, x, left = p + step, y, new
+                elif new < left:  # new slopes, if they can help
+                    done = new > 0.9 * left
+                    p, x, left, A = p + step, y, new, None
+                    if done:
+                        break
+                else:
+                    break
+            if left > goal:
+                break
+        return left
+
+    def slopes(self, rows: Any, p: Any, n: int, places: Any, x: Any) -> Any:
+        return np.array([rows(p + SMALL * np.eye(len(p))[i], n) - x for i in places]).reshape(-1, len(x)).T / SMALL
 
 
 def rows_of(made: Any, t: Any, Y: Any) -> Rows:
@@ -108,8 +155,7 @@ def rows_of(made: Any, t: Any, Y: Any) -> Rows:
     # A method that diverges is compared at the scale of the exact motion.
     scale = float(np.linalg.norm(Y[:, 4:], axis=1).max()) or 1.0
     scale = min(scale, 10 * float(np.linalg.norm(world.solve(t[-1:], y0, t[0])[0, 4:])) + float(np.linalg.norm(y0[4:]))) or 1.0
-    inexact = made.noise != "none" or max(made.about["grain"]) > 1e-8
-    return Rows(world, t, Y, y0, kept, grain, scale, inexact, dict(made.about))
+    return Rows(world, t, Y, y0, kept, grain, scale, made.noise != "none" or max(made.about["grain"]) > 1e-8)
 
 
 def decide(made: Any, t: Any, Y: Any) -> None:
@@ -122,13 +168,9 @@ def decide(made: Any, t: Any, Y: Any) -> None:
         made.reason = "" if made.identifiable else "less than half a turn"
         return
     rows = rows_of(made, t, Y)
-    near = rows.take(rows.near)
-    made.size = near.left(near.d)
-    if near.near < len(t) and made.size < WRONG:
-        made.size = max(made.size, rows.left(rows.d))
+    made.size = rows.fit(goal=WRONG)
     norm = abs(np.linalg.norm(Y[:, :4], axis=1) - 1).max() if "q" in LAYOUTS[made.layout].has else 0.0
-    few = made.mistake in ("single rows", "first row", "transposed in some rows", "dropped rows")
-    if few:
+    if made.mistake in ("single rows", "first row", "transposed in some rows", "dropped rows"):
         d = (rows.d.reshape(len(t), -1, 3) ** 2).sum(axis=2)
         made.size = max(made.size, float(np.sqrt(d.max())) / 5)
     if max(made.size, norm / made.about["grain"][0] * (norm > 1e-5)) < WRONG:
@@ -139,111 +181,149 @@ def decide(made: Any, t: Any, Y: Any) -> None:
     if made.kind == "pair":
         made.reason, made.same = "two mistakes at once", {*made.about["pair"]}
         return
-    if made.size < IDENTIFIABLE:
-        made.reason = "noise or digits nearly hide it"
-        made.same = {name for name, _, left in rivals(made, near) if left < IDENTIFIABLE}
-        return
-    mine, blocking = NUMBERS.get(made.mistake, 0), ""
-    for name, numbers, left in rivals(made, near):
+    mine, blocking = NUMBERS.get(made.mistake, 0), list[str]()
+    for name, numbers, left in rivals(made, rows):
         if name != made.mistake and left < IDENTIFIABLE:
             made.same.add(name)
-            if numbers <= mine:
-                blocking = blocking or name
-    made.identifiable = not blocking
-    made.reason = f"the same rows: {blocking}" if blocking else ""
+            blocking += [name] * (numbers <= mine)
+    made.identifiable = not blocking and made.size >= IDENTIFIABLE
+    made.reason = f"the same rows: {blocking[0]}" if blocking else ""
+    if made.size < IDENTIFIABLE:
+        made.reason = "noise or digits nearly hide it"
 
 
-def rivals(made: Any, rows: Rows) -> Any:
+def rivals(made: Any, rows: Rows) -> Iterator[tuple[str, int, float]]:
     """Yield other explanations: a name, the number of its fitted numbers, and what they leave of the differences, in grains."""
     world, t, y0, at = rows.world, rows.t, rows.y0, rows.t[0]
-    e = 1e-6
-
-    def motion_of(other: World) -> Any:
-        return rows.off(other.solve(t, y0, at))
-
-    def fitted(name: str, *vectors: Any) -> tuple[str, int, float]:
-        return name, len(vectors), rows.left(rows.d, *vectors)
-
-    # The scene: parts that are missing, reversed or of another size. A difference of two exact motions is not scaled.
+    n = len(t)
+    # The scene: parts that are missing or reversed.
     for name, change in SCENES.items():
         if NUMBERS.get(name, 0) == 0 and name != made.mistake and (other := change(world, Draw(0))) is not None:
-            yield name, 0, rows.left(rows.d - motion_of(other))
-    varied: list[tuple[str, list[World]]] = [("damping", [world.but(drag=e * rows.scale)])]
-    varied += [("size of the rotor", [world.but(wheel=scaled(world.wheel, 1 + e))])] if world.wheel is not None else []
-    varied += [("size of the torque", [world.but(torque=scaled(world.torque, 1 + e))])] if world.torque is not None else []
-    varied += [("size of the damping", [world.but(damping=world.damping * (1 + e))])] if world.damping is not None else []
-    varied += [("size of the field", [world.but(pull=1 + e)])] * (world.field is not None)
-    varied += [("rate of the orbit", [other_orbit(world, 1 + e)])] if world.orbit is not None else []
-    varied += [("speed of attitudes", [world.but(speed=1 + e)])]
-    moments, axes = np.linalg.eigh(world.J)
-    bodies = [world.with_inertia(world.J + e * moments[i] * np.outer(axes[:, i], axes[:, i])) for i in range(3)]
-    varied += [("other moments", bodies)]
-    size = float(moments.mean())
-    pairs = [(i, j) for i in range(3) for j in range(i, 3)]
-    full = [np.zeros((3, 3)) for _ in pairs]
-    for matrix, (i, j) in zip(full, pairs, strict=True):
-        matrix[i, j] = matrix[j, i] = 1.0
-    varied += [("another body", [world.with_inertia(world.J + e * size * matrix) for matrix in full])]
-    for name, others in varied:
-        yield fitted(name, *(motion_of(other) / e for other in others))
+            yield name, 0, rows.fit(0, lambda y, p, k, other=other: other.solve(t[:k], y, at))
+    for name, numbers, vary in varied(world, rows.scale):
+        if name != made.mistake:
+            yield name, numbers, rows.fit(numbers, lambda y, p, k, vary=vary: vary(p).solve(t[:k], y, at))
     # Times: along the motion.
-    E = rows.E
-    after = world.solve(t + 1e-6 / rows.scale, y0, at)
-    late = rows.off(after) / 1e-6
-    elapsed = np.repeat((t - at) * rows.scale, len(rows.kept))
-    yield fitted("time shift", np.where(elapsed > 0, late, 0.0))
-    yield fitted("phase drift", late, elapsed * late)
+    elapsed = t - at
+    shifted: dict[str, tuple[int, Any]] = {
+        "time shift": (1, lambda p: np.where(elapsed > 0, elapsed + p[0] / rows.scale, 0.0)),
+        "phase drift": (2, lambda p: elapsed * (1 + p[1]) + p[0] / rows.scale),
+    }
+    for name, (numbers, times) in shifted.items():
+        if name != made.mistake:
+            yield name, numbers, rows.fit(numbers, lambda y, p, k, times=times: solve_any(world, at + times(p)[:k], y, at))
     if len(rows.kept) == 6:
-        yield fitted("rates at other times", rows.off(np.hstack([E[:, :4], after[:, 4:]])) / 1e-6)
-        rates = E[:, 4:]
-        yield fitted("size of the rates", rows.off(np.hstack([E[:, :4], rates * (1 + e)])) / e)
-        yield fitted("bias of the rates", *(rows.off(np.hstack([E[:, :4], rates + e * rows.scale * v])) / e for v in np.eye(3)))
-        turns = [motion.turn(e * v) for v in np.eye(3)]
-        yield fitted("rates in turned axes", *(
-            rows.off(np.hstack([E[:, :4], motion.spin(np.broadcast_to(c, (len(t), 4)), rates)])) / e for c in turns
-        ))
-        yield fitted("body axes", *(
-            rows.off(np.hstack([
-                motion.times(E[:, :4], np.broadcast_to(c, (len(t), 4))),
-                motion.spin(np.broadcast_to(motion.back(c), (len(t), 4)), rates),
-            ])) / e
-            for c in turns
-        ))  # fmt: skip
-        drift = (t - at)[:, None] * rows.scale
-        yield fitted("constant turn", *(
-            rows.off(np.hstack([motion.times(E[:, :4], motion.turn(e * drift * v)), rates])) / e for v in np.eye(3)
-        ))
-    # Times of each row for itself.
-    if made.mistake in ("jittered times", "dropped rows") or made.size < CLOSE:
-        a, b = rows.d.reshape(len(t), -1), late.reshape(len(t), -1)
+        for name, numbers, change in rates_and_attitudes(rows):
+            if name != made.mistake:
+                yield name, numbers, rows.fit(numbers, lambda y, p, k, change=change: change(rows.exact(y, k), y, p))
+    if made.mistake == "dropped rows" or made.size < CLOSE:
+        late = rows.off(solve_any(world, t + SMALL / rows.scale, y0, at)) - rows.d
+        a, b = rows.d.reshape(n, -1), late.reshape(n, -1)
         along = (a * b).sum(axis=1, keepdims=True) / np.maximum((b * b).sum(axis=1, keepdims=True), 1e-300)
-        yield "jittered times", 99, rows.left((a - along * b).ravel())
-    # Long steps.
+        yield "jittered times", 99, rows.size((a - along * b).ravel())
+    yield from steps(made, rows)
+    # Other readings: what the file means by them is an exact motion.
+    for name in BOTH if len(rows.kept) == 6 and made.kind != "step" else ():
+        if name in UNREAD and name != made.mistake:
+            Z = np.hstack(UNREAD[name](rows.Y[:, :4], rows.Y[:, 4:]))
+            few = Rows(world, t[:3], Z[:3], Z[0], rows.kept, rows.grain, rows.scale, rows.inexact)
+            if few.size(few.d) < 30 * IDENTIFIABLE:
+                yield name, 0, Rows(world, t, Z, Z[0], rows.kept, rows.grain, rows.scale, rows.inexact).fit()
+
+
+def solve_any(world: World, t: Any, y: Any, at: float) -> Any:
+    """Return the exact motion at times that may lie before the first row or out of order."""
+    order = np.argsort(t, kind="stable")
+    early = t[order] < at
+    out = np.empty((len(t), 7))
+    out[order[~early]] = world.solve(t[order[~early]], y, at)
+    if early.any():  # backwards in time: a small part of a row, to first order
+        step = 1e-4 / world.rate
+        ahead = world.solve(np.array([at + step]), y, at)[0]
+        out[order[early]] = y + (t[order[early]] - at)[:, None] / step * (ahead - y)
+    return out
+
+
+def varied(world: World, scale: float) -> Iterator[tuple[str, int, Callable[[Any], World]]]:
+    """Yield other worlds: a name, the number of their numbers, and the world of some numbers, which are 0 for the right one."""
+    yield "damping", 1, lambda p: world.but(drag=p[0] * scale)
+    if world.wheel is not None:
+        yield "size of the rotor", 1, lambda p: world.but(wheel=scaled(world.wheel, 1 + p[0]))
+    if world.torque is not None:
+        yield "size of the torque", 1, lambda p: world.but(torque=scaled(world.torque, 1 + p[0]))
+    if world.damping is not None:
+        yield "size of the damping", 1, lambda p: world.but(damping=world.damping * (1 + p[0]))
+    if world.field is not None:
+        yield "size of the field", 1, lambda p: world.but(pull=1 + p[0])
+    if world.orbit is not None:
+        yield "rate of the orbit", 1, lambda p: other_orbit(world, 1 + p[0])
+    yield "speed of attitudes", 1, lambda p: world.but(speed=1 + p[0])
+    moments, axes = np.linalg.eigh(world.J)
+    yield "other moments", 3, lambda p: world.with_inertia(axes @ np.diag(moments * np.exp(p)) @ axes.T)
+
+    def body(p: Any) -> World:
+        half = np.eye(3)
+        half[np.tril_indices(3)] += p
+        return world.with_inertia(half @ world.J @ half.T)
+
+    yield "another body", 6, body
+
+
+def rates_and_attitudes(rows: Rows) -> Iterator[tuple[str, int, Callable[[Any, Any, Any], Any]]]:
+    """Yield changes of exact rows (n, 7), which start at y, by numbers, that only attitudes and rates together show."""
+    world, t, scale = rows.world, rows.t, rows.scale
+    at = t[0]
+
+    def late(Z: Any, y: Any, p: Any) -> Any:
+        return np.hstack([Z[:, :4], solve_any(world, t[: len(Z)] - p[0] / scale, y, at)[:, 4:]])
+
+    def turned(Z: Any, y: Any, p: Any) -> Any:
+        return np.hstack([Z[:, :4], motion.spin(np.broadcast_to(motion.turn(p), (len(Z), 4)), Z[:, 4:])])
+
+    def axes(Z: Any, y: Any, p: Any) -> Any:
+        c = np.broadcast_to(motion.turn(p), (len(Z), 4))
+        return np.hstack([motion.times(Z[:, :4], c), motion.spin(motion.back(c), Z[:, 4:])])
+
+    def drift(Z: Any, y: Any, p: Any) -> Any:
+        return np.hstack([motion.times(Z[:, :4], motion.turn(np.outer((t[: len(Z)] - at) * scale, p))), Z[:, 4:]])
+
+    yield "rates at other times", 1, late
+    yield "size of the rates", 1, lambda Z, y, p: np.hstack([Z[:, :4], Z[:, 4:] * (1 + p[0])])
+    yield "bias of the rates", 3, lambda Z, y, p: np.hstack([Z[:, :4], Z[:, 4:] + scale * p])
+    yield "rates in turned axes", 3, turned
+    yield "body axes", 3, axes
+    yield "constant turn", 3, drift
+
+
+def steps(made: Any, rows: Rows) -> Iterator[tuple[str, int, float]]:
+    """Yield integrators with a long step, and rules for attitudes, whose differences are scaled, so that each has its best step."""
+    world, t, y0, at, E = rows.world, rows.t, rows.y0, rows.t[0], rows.exact(rows.y0, len(rows.t))
     gap, parts = float(made.about["gap"]), int(made.about["parts"])
-    if (made.kind == "step" or made.size < CLOSE) and at == 0:
-        index = np.rint(t / gap).astype(int)
-        n = int(index[-1]) + 1
-        begun = world.but(q0=y0[:4], w0=y0[4:])
-        for name in STEPS:
-            if name != made.mistake and not (name.startswith("Buss") and is_table(world.wheel)):
-                many = march(begun, name, n, gap, parts)[index]
-                if np.isfinite(many).all():
-                    yield fitted(name, rows.off(many))
-    if made.kind == "attitude" and at == 0:
+    if at != 0 or not (made.kind in ("step", "attitude") or made.size < CLOSE):
+        return
+    near = rows.near
+
+    def scaled_size(Z: Any) -> float:
+        # Differences from the exact motion are a multiple of those of the rival.
+        x = (differences(E[:near], Z[:near], rows.scale)[:, rows.kept] / rows.grain).ravel()
+        A = np.column_stack([rows.begun[: len(x)], x])
+        A = A / np.maximum(np.abs(A).max(axis=0), 1e-300)
+        d = rows.d[: len(x)]
+        return rows.size(d - A @ np.linalg.lstsq(A, d, rcond=1e-12)[0])
+
+    begun = world.but(q0=y0[:4], w0=y0[4:])
+    index = np.rint(t / gap).astype(int)
+    for name in STEPS if made.kind != "attitude" else ():
+        if name != made.mistake and not (name.startswith("Buss") and is_table(world.wheel)):
+            Z = march(begun, name, int(index[-1]) + 1, gap, parts)[index]
+            if np.isfinite(Z).all():
+                yield name, 1, scaled_size(Z)
+    if made.kind == "attitude":
         h = gap / parts
-        n = len(t)
-        w = world.solve(np.arange((n - 1) * parts + 1) * h, y0)[:, 4:]
+        w = world.solve(np.arange((near - 1) * parts + 1) * h, y0)[:, 4:]
         for name, rule in ATTITUDES.items():
             if name != made.mistake:
-                yield fitted(name, rows.off(np.hstack([integrate(rule, y0[:4], w, h, parts), E[:, 4:]])))
-    # Other readings: what the file means by them is an exact motion.
-    if len(rows.kept) == 6 and made.kind != "step":
-        for name in BOTH:
-            inverse = UNREAD.get(name)
-            if inverse and name != made.mistake:
-                Z = np.hstack(inverse(rows.Y[:, :4], rows.Y[:, 4:]))
-                meant = Rows(world, t, Z, Z[0], rows.kept, rows.grain, rows.scale, rows.inexact)
-                yield name, 0, float(np.sqrt((meant.d**2).mean()))
+                yield name, 1, scaled_size(np.hstack([integrate(rule, y0[:4], w, h, parts), E[:near, 4:]]))
 
 
 UNREAD: dict[str, Any] = {

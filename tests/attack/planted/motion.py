@@ -176,8 +176,9 @@ def _stretch(t, H, y, p, tt, tv, mt, mv, scale, new, T, a, b, k):  # type: ignor
 def solve(y0, start, times, breaks, p, tt, tv, mt, mv, longest):  # type: ignore[no-untyped-def]
     """Return the states (n, 7) of the exact motion at increasing times, s, from the state at `start`.
 
-    No stretch is longer than `longest`, s, or has one of the breaks inside.
+    No stretch is longer than `longest`, s, or has one of the breaks inside. A motion that needs very short ones ends: rows of nan.
     """
+    left = 200 + 4 * len(times) + int(20 * (times[-1] - start) / longest)
     rows = np.full((len(times), 7), np.nan)
     T, a, b, k, new, y = np.empty((COLUMNS, 7)), np.empty(7), np.empty(7), np.empty(7), np.empty(7), y0.copy()
     t, part = start, longest
@@ -191,6 +192,9 @@ def solve(y0, start, times, breaks, p, tt, tv, mt, mv, longest):  # type: ignore
             whole = H == end - t
             scale = max(math.sqrt(y[4] * y[4] + y[5] * y[5] + y[6] * y[6]), 1e-300)
             if not math.isfinite(scale) or scale > 1e100:
+                return rows
+            left -= 1
+            if left < 0:
                 return rows
             error = _stretch(t, H, y, p, tt, tv, mt, mv, scale, new, T, a, b, k)
             if error > 1e-13 and H > 1e-6 * longest:

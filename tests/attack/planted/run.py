@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import shlex
-import sys
+import signal
 import tempfile
 import time
-from collections.abc import Iterable, Iterator
-from multiprocessing import Process
+from collections.abc import Iterable, Iterator, Sequence
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 from .files import Planted, plant
 
 BARE = " without normalisation"
+LONGEST = 60.0
+"""Processor time, s, after which a verification is ended."""
 ALIASES: dict[str, tuple[str, ...]] = {
     "without the rotor": ("size of the rotor",),
     "without the torque": ("size of the torque",),
@@ -57,6 +60,19 @@ def command(made: Planted) -> str:
     return shlex.join(words)
 
 
+class TooLong(KeyboardInterrupt):
+    """Not an `Exception`, so that nothing on the way takes it for a fault of the file."""
+
+
+def _stop(number: int, frame: object) -> None:
+    raise TooLong
+
+
+def digest(made: Planted) -> str:
+    """Return a digest of a file and its scene."""
+    return hashlib.sha256((made.scene + made.text).encode()).hexdigest()[:12]
+
+
 def outcome(seed: int, folder: Path) -> dict[str, Any]:
     """Return the row of a seed: the file, the answer, and the complaint about it."""
     from conservative.benchmarks.verification.verify import verify
@@ -74,8 +90,13 @@ def outcome(seed: int, folder: Path) -> dict[str, Any]:
         "size": made.size, "scene": made.about["parts of the scene"], "command": command(made),
         **{key: made.about.get(key, 0) for key in ("turns", "rows", "shape", "special", "gaps", "nan", "duplicated", "cut")},
         "grain": made.about["grain"], "per turn": round(made.about["per turn"], 2), "parts": made.about["parts"],
+        "text": digest(made),
     }  # fmt: skip
+    limited = hasattr(signal, "setitimer")
+    before = signal.signal(signal.SIGPROF, _stop) if limited else None
     try:
+        if limited:
+            signal.setitimer(signal.ITIMER_PROF, LONGEST)
         (found,) = verify([path], scene, **made.options)
         finding = found.findings[0]
         row |= {
@@ -84,6 +105,12 @@ def outcome(seed: int, folder: Path) -> dict[str, Any]:
         }  # fmt: skip
     except BadInput as error:
         row |= {"verdict": "refused", "reason given": str(error), "named": [], "notes": []}
+    except TooLong:
+        row |= {"verdict": "no answer", "reason given": f"no answer in {LONGEST:g} s", "named": [], "notes": []}
+    finally:
+        if limited:
+            signal.setitimer(signal.ITIMER_PROF, 0)
+            signal.signal(signal.SIGPROF, before)
     row["seconds"] = [round(begun - began, 2), round(time.process_time() - begun, 2)]
     return row | {"complaint": complaint(row)}
 
@@ -107,8 +134,8 @@ def is_named(row: dict[str, Any]) -> bool:
 
 def complaint(row: dict[str, Any]) -> str:
     """Return the complaint about the answer to a file, or ""."""
-    if row["verdict"] == "refused":
-        return "refused"
+    if row["verdict"] in ("refused", "no answer"):
+        return str(row["verdict"])
     if row["expected"] == "right" and row["verdict"] == "wrong":
         return "right called wrong"
     if row["expected"] == "wrong" and row["verdict"] == "right":
@@ -157,30 +184,27 @@ def line_of(row: dict[str, Any]) -> str:
     )
 
 
-def work(path: str, seeds: list[int]) -> None:
-    for _ in run(Path(path), seeds, lambda text: print(text, flush=True)):
+def _work(path: Path, seeds: list[int]) -> None:
+    for _ in run(path, seeds, lambda text: print(text, flush=True)):
         pass
 
 
-def in_processes(path: Path, seeds: list[int], count: int) -> list[dict[str, Any]]:
-    """Return the rows of seeds, verified by some processes; each appends to a file of its own, which `path` gets at the end."""
+def run_all(path: Path, seeds: Sequence[int], count: int = 2) -> list[dict[str, Any]]:
+    """Return the rows of seeds, verified in some processes. Each appends to a file of its own; `path` gets all rows at the end."""
     parts = [path.with_suffix(f".{i}.jsonl") for i in range(count)]
-    done = {row["seed"] for part in (path, *parts) for row in load(part)}
+    others = [part for part in path.parent.glob(f"{path.stem}.*.jsonl") if part not in parts]
+    done = {row["seed"] for part in (path, *parts, *others) for row in load(part)}
     left = [seed for seed in seeds if seed not in done]
-    workers = [Process(target=work, args=(str(part), left[i::count])) for i, part in enumerate(parts)]
+    start = get_context("spawn").Process  # compiled code and its threads do not survive a fork everywhere
+    workers = [start(target=_work, args=(part, left[i::count])) for i, part in enumerate(parts)]
     for worker in workers:
         worker.start()
     for worker in workers:
         worker.join()
     if any(worker.exitcode for worker in workers):
-        raise SystemExit(f"a process ended with {[worker.exitcode for worker in workers]}")
-    rows = {row["seed"]: row for part in (path, *parts) for row in load(part)}
-    path.write_text("".join(json.dumps(row) + "\n" for row in rows.values()), encoding="utf-8")
-    for part in parts:
+        raise RuntimeError(f"a process ended with {[worker.exitcode for worker in workers]}; its rows are kept")
+    rows = {row["seed"]: row for part in (path, *parts, *others) for row in load(part)}
+    path.write_text("".join(json.dumps(rows[seed]) + "\n" for seed in sorted(rows)), encoding="utf-8")
+    for part in (*parts, *others):
         part.unlink(missing_ok=True)
     return [rows[seed] for seed in seeds]
-
-
-if __name__ == "__main__":
-    file, first, end, *count = sys.argv[1:]
-    in_processes(Path(file), list(range(int(first), int(end))), int((count or ["2"])[0]))

@@ -237,7 +237,8 @@ def draw_body(draw: Draw, shape: str) -> tuple[Any, Any]:
     moments = draw.random.uniform(0.6, 2, size=3)
     moments[2] = max(min(moments[2], 0.95 * moments[:2].sum()), 1.05 * abs(moments[0] - moments[1]))
     if draw.chance(0.15):  # a needle
-        moments = np.array([1.0, draw.random.uniform(1.0, 1.05), draw.between(0.01, 0.3)])
+        wider, thin = draw.random.uniform(0.0, 1.0), draw.between(0.01, 0.3)
+        moments = np.array([1.0, 1.0 + 0.9 * wider * thin, thin])
     if shape.startswith("symmetric"):
         moments[1] = moments[0]
         moments[2] = min(moments[2], 1.9 * moments[0])
