@@ -48,6 +48,11 @@ HOPELESS = 30.0
 """Error, in units of the noise, from which no other first row explains it."""
 LINEAR = 0.3
 """Largest difference of motions, rad, that is treated to first order."""
+FEWEST_LINEAR, MOST_LEFT, HIDDEN_BY_NOISE = 8, 0.7, 3.0
+"""Rows from which `may_explain` decides, the share of the difference that a possible mistake leaves, and the root of the mean
+square, in units of the noise, below which it does not decide."""
+ROWS_OF_EFFORT = 500
+"""Number of rows whose comparison takes as long as a stretch of a motion."""
 PERTURBED = 1e-8, 1e-12
 """Changes of initial states that show how the motion multiplies them. The second is used where the first becomes large."""
 STRAIGHT, NARROWED = 0.03, 6
@@ -99,10 +104,11 @@ def take_rows(data: States, rows: Any) -> States:
 
 def weigh(scene: Scene) -> float:
     """Return the work of a solution in a scene, relative to the work for a free body."""
-    weight = 1.0 + 2.0 * (scene.potential is not None) + 3.0 * bool(scene.features & IN_TIME)
     varying = None if scene.damping is None else scene.damping.of_time
     slow = (scene.torque is not None and scene.torque.of_attitude) or (varying is not None and varying.of_attitude)
-    return weight + 1.0 * bool(scene.loads) + 6.0 * slow  # functions of attitude are called for each state
+    in_python = scene.potential is not None and Equations(scene).law is None
+    weight = 1.0 + 0.5 * bool(scene.features & IN_TIME) + 2.0 * bool(scene.loads)
+    return weight + 40.0 * (slow or in_python)  # functions of attitude are called for each state in each iteration
 
 
 def take_part(motion: tuple[Array, Array], of: States) -> States:
@@ -115,7 +121,7 @@ def take_part(motion: tuple[Array, Array], of: States) -> States:
 class Effort:
     """The work that a search may still do. It is counted, because the clock depends on how busy the machine is.
 
-    The unit is a stretch of a solution (`Equations.flow`), one to three milliseconds on an idle machine.
+    The unit is a stretch of a solution (`Equations.flow`), 0.3 ms on an idle machine.
     """
 
     left: float
@@ -215,6 +221,48 @@ class Compared:
                 return some
         return None
 
+    @cached_property
+    def departure(self) -> tuple[Array, Array]:
+        """The first rows minus the exact motion, (n, 6), and the matrices (n, 6, 6) that carry changes of its start there.
+
+        Differences are of first order in these rows. With a start that is exact there are no matrices, (n, 6, 0).
+        """
+        R, w = (x if y is None else y for x, y in zip(self.exact, self.data, strict=True))  # no difference without data
+        away = differ(*self.exact, R, w, self.scale)
+        n = count_linear(away)
+        flow = linearise(self.take(slice(0, n)))[2][:, :, list(self.free)] if self.free else np.zeros((n, 6, 0))
+        return away[:n], flow
+
+    def may_explain(self, motion: Solution, numbers: Array, small: Array) -> bool:
+        """Return whether a motion can explain the error of the first rows to first order, with its numbers and start fitted.
+
+        It decides in one evaluation what a fit would find after many. It cannot decide, and returns True, where the motion
+        begins far from the rows or where noise hides the difference.
+        """
+        away, flow = self.departure
+        n = len(away)
+        if n < min(FEWEST_LINEAR, len(self.t)):
+            return True
+        some = self.take(slice(0, n))
+        moved = np.vstack([numbers, numbers + np.diag(small)]) if len(numbers) else numbers[None]
+        R, w = some.evaluate(motion, np.hstack([np.zeros((len(moved), 6)), moved]))
+        made = differ(some.exact[0], some.exact[1], R, w, self.scale)
+        n = min(n, count_linear(made[0]))
+        if n < min(FEWEST_LINEAR, len(self.t)) or not np.isfinite(w[:, :n]).all():
+            return True
+        weights = np.repeat([float(x is not None) for x in self.data] / self.noise, 3)
+        wanted = ((away[:n] - made[0, :n]) * weights).ravel()
+        columns = [((flow[:n, :, k]) * weights).ravel() for k in range(flow.shape[2])]
+        columns += [((x[:n] - made[0, :n]) / size * weights).ravel() for x, size in zip(made[1:], small, strict=True)]
+        plain = (away[:n] * weights).ravel()
+        if columns:
+            matrix = np.stack(columns, axis=1)
+            wanted = wanted - matrix @ np.linalg.lstsq(matrix, wanted, rcond=None)[0]
+            starts = matrix[:, : flow.shape[2]]
+            plain = plain - starts @ np.linalg.lstsq(starts, plain, rcond=None)[0]
+        left, size = np.linalg.norm(wanted), np.linalg.norm(plain)
+        return bool(left < MOST_LEFT * size or left < HIDDEN_BY_NOISE * np.sqrt(6 * n))
+
     @property
     def turned(self) -> float:
         """The angle, rad, by which the body may have turned."""
@@ -262,7 +310,8 @@ class Compared:
     def evaluate(self, motion: Solution, many: Array) -> tuple[Array, Array]:
         """Return motions (B, n, 3, 3), (B, n, 3) of changes of the initial state and other numbers, (B, 6 + k)."""
         turns = Rotation.from_rotvec(many[:, :3]).as_matrix()
-        self.effort.spend(weigh(self.scene) * (1 + self.turned / ANGLE + len(self.scene.breaks)) * (1 + len(many) / 16))
+        stretches, bodies = 1 + self.turned / ANGLE + len(self.scene.breaks), len(many)
+        self.effort.spend(weigh(self.scene) * stretches * (1 + bodies) / 2 + bodies * len(self.t) / ROWS_OF_EFFORT)
         return motion(self.scene.R_WB0 @ turns, self.scene.w_WB_B0 + many[:, 3:6] * self.scale, many[:, 6:], len(self.t))
 
     def equations(self, scene: Scene | None = None, gyroscopic: float = 1.0, **changes: Any) -> Equations:
@@ -427,6 +476,12 @@ def differ(R0: Array, w0: Array, R: Array, w: Array, scale: float) -> Array:
     turn[np.abs(np.linalg.det(turn)) < 0.5] = np.eye(3)
     vector = Rotation.from_matrix(turn.reshape(-1, 3, 3)).as_rotvec().reshape(*turn.shape[:-2], 3)
     return np.concatenate([vector, np.nan_to_num(w - w0) / scale], axis=-1)
+
+
+def count_linear(differences: Array) -> int:
+    """Return the number of first rows whose differences (n, 6) are of first order."""
+    far = np.linalg.norm(differences, axis=1) > LINEAR
+    return int(np.argmax(far)) if far.any() else len(far)
 
 
 def linearise(case: Compared) -> tuple[Array, Array, Array]:

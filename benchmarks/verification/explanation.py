@@ -202,9 +202,12 @@ def _attempt(
     def scaled(R: Array, w: Array, p: Array, n: int) -> tuple[Array, Array]:
         return motion(R, w, p * units, n)
 
-    _, p, made = case.change(free=()).fit(scaled, p, np.full(len(p), small), most)
+    small_changes = np.full(len(p), small)
+    if not case.may_explain(scaled, p, small_changes):
+        return None
+    _, p, made = case.change(free=()).fit(scaled, p, small_changes, most)
     error = case.errors(*made)
     if case.free and not case.passes(error) and (error.max(axis=1) <= HOPELESS * case.noise * case.growth).any():
-        _, p, made = case.fit(scaled, p, np.full(len(p), small), most)
+        _, p, made = case.fit(scaled, p, small_changes, most)
     names = (number.name for number in trial.numbers)
     return explain(case, trial, made, dict(zip(names, (p * units).tolist(), strict=True)) | dict(known))

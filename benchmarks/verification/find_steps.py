@@ -15,9 +15,9 @@ from .explanation import Explanation, Trial, attempt
 from .mistakes.steps import INTEGRATORS, Integrator, Step
 from .solution import Equations, truth
 
-CHUNK, CHUNK_EFFORT = 256, 8
+CHUNK, CHUNK_EFFORT = 256, 100
 """Steps after which work is counted, and their work (`Effort`)."""
-ROWS, STEP_EFFORT = 400, 0.15
+ROWS, STEP_EFFORT = 400, 1.0
 """Largest number of rows that candidates are compared with, and the work of one step from all of them."""
 STEPS_AT_MOST, PARTS = 20_000, 2000
 """Largest numbers of steps of a method, over the file and between two rows."""
