@@ -15,7 +15,6 @@ from .motion import (
     LEAPFROG,
     NONE,
     RUNGE_KUTTA,
-    RUNGE_KUTTA_TURNED,
     SPLIT,
     STORMER,
     TABLEAUX,
@@ -153,9 +152,9 @@ STEPS: dict[str, tuple[int, Any, int, bool]] = {
     "RK3 (Heun)": (RUNGE_KUTTA, TABLEAUX["Heun 3"], 0, False),
     "RK3 (SSP)": (RUNGE_KUTTA, TABLEAUX["SSP 3"], 0, False),
     "RK4": (RUNGE_KUTTA, TABLEAUX["RK4"], 0, False),
-    "the explicit midpoint rule (RK2)" + TURNED: (RUNGE_KUTTA_TURNED, TABLEAUX["midpoint"], 0, False),
-    "Heun's method" + TURNED: (RUNGE_KUTTA_TURNED, TABLEAUX["Heun"], 0, False),
-    "RK4" + TURNED: (RUNGE_KUTTA_TURNED, TABLEAUX["RK4"], 0, False),
+    "the explicit midpoint rule (RK2)" + TURNED: (RUNGE_KUTTA, TABLEAUX["midpoint"], 0, True),
+    "Heun's method" + TURNED: (RUNGE_KUTTA, TABLEAUX["Heun"], 0, True),
+    "RK4" + TURNED: (RUNGE_KUTTA, TABLEAUX["RK4"], 0, True),
     "Adams-Bashforth 2 (first step Euler)": (ADAMS, NONE, 2, False),
     "Adams-Bashforth 3": (ADAMS, NONE, 3, False),
     "leapfrog (velocity Verlet)": (LEAPFROG, NONE, 0, False),
@@ -170,7 +169,7 @@ def march(world: World, name: str, n: int, gap: float, parts: int, normalise: bo
     family, (A, b), number, flag = STEPS[name]
     with np.errstate(all="ignore"):
         return motion.march(
-            world.start, 0.0, gap / parts, (n - 1) * parts, parts, family, A, b, number, flag, normalise, single, *world.given
+            world.start, gap / parts, (n - 1) * parts, parts, family, A, b, number, flag, normalise, single, world.given
         )
 
 

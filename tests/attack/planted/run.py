@@ -8,6 +8,7 @@ import shlex
 import signal
 import tempfile
 import time
+import traceback
 from collections.abc import Iterable, Iterator, Sequence
 from multiprocessing import get_context
 from pathlib import Path
@@ -107,6 +108,8 @@ def outcome(seed: int, folder: Path) -> dict[str, Any]:
         row |= {"verdict": "refused", "reason given": str(error), "named": [], "notes": []}
     except TooLong:
         row |= {"verdict": "no answer", "reason given": f"no answer in {LONGEST:g} s", "named": [], "notes": []}
+    except Exception:  # a fault of the verification, which is a complaint
+        row |= {"verdict": "crashed", "reason given": traceback.format_exc(limit=-3), "named": [], "notes": []}
     finally:
         if limited:
             signal.setitimer(signal.ITIMER_PROF, 0)
@@ -134,7 +137,7 @@ def is_named(row: dict[str, Any]) -> bool:
 
 def complaint(row: dict[str, Any]) -> str:
     """Return the complaint about the answer to a file, or ""."""
-    if row["verdict"] in ("refused", "no answer"):
+    if row["verdict"] in ("refused", "no answer", "crashed"):
         return str(row["verdict"])
     if row["expected"] == "right" and row["verdict"] == "wrong":
         return "right called wrong"

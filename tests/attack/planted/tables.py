@@ -84,6 +84,7 @@ def rates(rows: Iterable[Row]) -> dict[str, tuple[int, int]]:
         "right files undecided": count(right, lambda row: row["verdict"] == "undecided"),
         "wrong files undecided": count(wrong, lambda row: row["verdict"] == "undecided"),
         "files that were not read": count(rows, lambda row: row["verdict"] == "refused"),
+        "no answer, or a crash": count(rows, lambda row: row["verdict"] in ("no answer", "crashed")),
         "identifiable mistakes that are named": count(known, is_named),
     }
 

@@ -87,7 +87,7 @@ class World:
             a, b = PLACES[name]
             p[a:b] = np.ravel(value)
 
-        put("J", self.J)
+        put("inertia", self.J)
         put("inverse", np.linalg.inv(self.J))
         put("gyroscopic", self.gyroscopic)
         put("field", self.pull)
@@ -95,11 +95,10 @@ class World:
         put("speed", self.speed)
         put("side", float(self.side))
         put("drag", self.drag)
-        put("torque", 1.0)
         if self.field is not None:
             kind, size, *rest = self.field
             put("kind", float(KINDS.index(kind)))
-            put("size", size)
+            put("amount", size)
             if kind == "gradient":
                 put("gradient", rest[0])
                 put("anchor", rest[1] / np.linalg.norm(rest[1]))
@@ -115,10 +114,10 @@ class World:
         if self.damping is not None:
             put("damping", self.damping)
         if self.fixed is not None:
-            put("fixed", 1.0)
-            put("start", self.fixed)
-            put("turn", np.linalg.inv(self.fixed))
-        put("world", float(self.axes == "world"))
+            put("is_fixed", 1.0)
+            put("fixed", self.fixed)
+            put("unfixed", np.linalg.inv(self.fixed))
+        put("in_world", float(self.axes == "world"))
         torque, wheel = table(self.torque), table(self.wheel)
         object.__setattr__(self, "numbers", p)
         object.__setattr__(self, "tables", (*torque, *wheel))
@@ -139,7 +138,7 @@ class World:
         """Return the exact states (n, 7) at times t, s, from the state at `start`."""
         y0 = self.start if y0 is None else np.asarray(y0, float)
         longest = 0.7 / max(self.rate, 1e-300)
-        return motion.solve(y0, start, np.asarray(t, float), self.breaks, *self.given, longest)
+        return motion.solve(y0, start, np.asarray(t, float), self.breaks, self.given, longest)
 
     @property
     def rate(self) -> float:
@@ -304,14 +303,3 @@ def draw_world(draw: Draw, need: str = "", shape: str = "", length: float = 50.0
         size = float(np.trace(J)) / 3 * rate * min(draw.between(0.003, 0.05), 1.0 / length)
         world = world.but(damping=size * (half @ half.T + 0.3 * np.eye(3)))
     return world, rate, shape
-
-
-def spread(world: World, t: Any) -> float:
-    """Return how much the motion multiplies small changes of its start."""
-    y, e = world.start, 1e-7
-    a, b = world.solve(t), world.solve(t, np.append(y[:4], y[4:] * (1 + e)))
-    return float(np.nanmax(np.abs(a - b)[:, :4])) / e
-
-
-def radians(turns: float) -> float:
-    return 2 * math.pi * turns
