@@ -123,7 +123,7 @@ class Rows:
                     begun = self.begun[:at] if not p.any() else self.slopes(rows, p, n, range(free), x)
                     A = np.hstack([begun, self.slopes(rows, p, n, range(free, len(p)), x)])
                 sizes = np.maximum(np.abs(A).max(axis=0), 1e-300)
-                step = np.linalg.lstsq(A / sizes, -x, rcond=1e-11)[0] / sizes
+                step = np.linalg.lstsq(A / sizes, -x, rcond=1e-6)[0] / sizes
                 if not np.abs(p + step).max() <= FARTHEST:
                     break
                 y = rows(p + step, n)
