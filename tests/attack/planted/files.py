@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from . import decide, motion
-from .layouts import DEG, LAYOUTS, digits_of, file_of, lines_of
+from .layouts import DEG, LAYOUTS, Layout, digits_of, file_of, lines_of
 from .mistakes import (
     ATTITUDES,
     ATTITUDES_ALONE,
@@ -46,6 +46,8 @@ MISTAKES: dict[str, tuple[tuple[str, ...], float]] = {
     "pair": ((PAIR,), 0.01),
 }
 """Kinds of mistakes, their names and shares."""
+FEWEST_TICKS = 50
+"""Smallest distance of rows in units of whole time stamps."""
 SPECIAL = ("at rest", "one axis", "two rows", "three rows", "ball", "constant")
 """Degenerate files."""
 
@@ -104,12 +106,19 @@ def choose(draw: Draw) -> tuple[str, str]:
     return kind, draw.pick(MISTAKES[kind][0])
 
 
-def fits(name: str, kind: str, mistake: str, world: World) -> bool:
-    """Return whether a layout can show a mistake, and agrees with the scene's time."""
-    layout = LAYOUTS[name]
-    has = layout.has.split()
+def has_times(layout: Layout, world: World, gap: float, coarse: bool) -> bool:
+    """Return whether a layout can have the times of the rows."""
     if layout.origin > 1e3 and world.in_time:  # times since 1970 are no times of the scene
         return False
+    if layout.whole and gap * layout.second < FEWEST_TICKS:
+        return False
+    return not (layout.unnamed and coarse)  # only close rows tell the unit of their time
+
+
+def fits(name: str, kind: str, mistake: str) -> bool:
+    """Return whether a layout can show a mistake."""
+    layout = LAYOUTS[name]
+    has = layout.has.split()
     if mistake in ("order xyzw", "order wxyz"):
         return "q" in has and name in ("quaternions wxyz", "quaternions xyzw", "PlotJuggler", "MuJoCo", "JSON lines", "TUM")
     if mistake == "rates in degrees":
@@ -157,7 +166,7 @@ def plant(seed: int) -> Planted:
     # Programs have habits, and no noise of a sensor.
     weights = {"step": [4, 2, 3, 2, 0.5, 1, 1, 1], "attitude": [4, 2, 3, 2, 0.5, 1, 1, 1], "habit": [4, 2, 3, 2, 1, 0, 0, 0]}
     noise = draw.pick(NOISES, weights.get(kind, [3, 1, 2, 2, 1, 1.5, 1.5, 1.5]))
-    names = [name for name in LAYOUTS if fits(name, kind, mistake, world)]
+    names = [name for name in LAYOUTS if fits(name, kind, mistake) and has_times(LAYOUTS[name], world, gap, coarse)]
     layout = draw.pick(names)
     made = Planted(seed, kind, mistake, world, layout, noise)
     made.about |= {"turns": round(turns, 3), "shape": shape, "special": special, "per turn": per_turn, "parts": parts, "gap": gap,
@@ -265,12 +274,14 @@ def write(draw: Draw, made: Planted, t: Any, Y: Any) -> None:
     number = digits_of(made.noise)
     ticks = t
     if layout.second > 1:
+        ticks = t * layout.second
+    if layout.whole:
         ticks = np.array([round(x * layout.second) for x in t.tolist()], dtype=object)
         base = round(layout.origin * layout.second) if not made.world.in_time else 0
         ticks = ticks + base
     if made.mistake == "time in ms":
         ticks = t * 1e3
-    blocks = layout.columns(q, w, ticks if layout.second == 1 else t)
+    blocks = layout.columns(q, w, t)
     blocks = [(kind, ticks if kind in ("t", "sec") else x) for kind, x in blocks]
     single = made.noise == "single"
     blocks = [(kind, x.astype(np.float32) if single and kind in ("q", "w") else x) for kind, x in blocks]
@@ -280,7 +291,7 @@ def write(draw: Draw, made: Planted, t: Any, Y: Any) -> None:
             rounded = np.array([float(number % v) for v in (x.astype(np.float32) if single else x).ravel()]).reshape(x.shape)
             found[kind] = float(np.sqrt(((rounded - x) ** 2).sum(axis=1).mean()))
     late = 0.0
-    if layout.second > 1:
+    if layout.whole:
         late = float(np.sqrt(np.mean([(int(k) - base - x * layout.second) ** 2 for k, x in zip(ticks, t.tolist(), strict=True)])))
         late = (late / layout.second + (1.2e-7 if layout.origin > 1e6 and layout.second == 1e9 else 0.0)) * scale
     more = made.about.get("round-off", 0.0)

@@ -31,11 +31,16 @@ class Layout:
     unit
         Unit of rates, per rad/s.
     second
-        Unit of times, per s; whole numbers if it is above 1.
+        Unit of times, per s; whole numbers from 1e6 on.
     options
         Options of the command that the layout needs.
     angle
         Error of an angle, rad, for an error of 1 in the numbers.
+    separator, comma, origin, before, after, form, ending
+        Separator of fields, decimal commas, time of the first row, s, lines before and after the header, "table", "JSON" or "lists",
+        and the ending of the file.
+    unnamed
+        True if nothing names the unit of whole times.
     """
 
     names: tuple[str, ...]
@@ -52,6 +57,12 @@ class Layout:
     after: str = ""
     form: str = "table"
     ending: str = ".csv"
+    unnamed: bool = False
+
+    @property
+    def whole(self) -> bool:
+        """Whether times are whole numbers."""
+        return self.second >= 1e6
 
 
 def last(q: Any) -> Any:
@@ -178,7 +189,7 @@ LAYOUTS: dict[str, Layout] = {
         ("timestamp", "timestamp_sample", "x", "y", "z", "q[0]", "q[1]", "q[2]", "q[3]", "vx", "vy", "vz", "rollspeed",
          "pitchspeed", "yawspeed"),
         lambda q, w, t: [("t", t), ("t", t), ("", 0 * w), ("q", q), ("", 0 * w), ("w", w)], "q R w", second=1e6,
-        options={"units": "rad", "quaternion": "wxyz"}, origin=12.0,
+        options={"units": "rad", "quaternion": "wxyz"}, origin=12.0, unnamed=True,
     ),
     "ArduPilot": Layout(
         ("TimeUS", "I", *triple("Gyr", "XYZ"), *triple("Acc", "XYZ"), "EG", "EA", "T"),
@@ -244,7 +255,7 @@ def lines_of(layout: Layout, blocks: list[tuple[str, Any]], number: str, empty: 
     cells: list[list[str]] = [[] for _ in range(n)]
     for kind, values in blocks:
         if kind == "t":
-            text = [repr(int(x)) for x in values] if layout.second > 1 else ["%.15g" % x for x in values]
+            text = [repr(int(x)) for x in values] if layout.whole else ["%.15g" % x for x in values]
             columns = [text]
         elif kind == "sec":
             columns = [[repr(int(x) // 10**9) for x in values], [repr(int(x) % 10**9) for x in values]]
