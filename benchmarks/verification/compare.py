@@ -57,6 +57,8 @@ PERTURBED = 1e-8, 1e-12
 """Changes of initial states that show how the motion multiplies them. The second is used where the first becomes large."""
 STRAIGHT, NARROWED = 0.03, 6
 """Largest difference of motions from which slopes are computed, and the number of trials with smaller changes."""
+CONVERGED = 1e-3
+"""Share of the sum of squares by which a step of a fit that has converged improves it."""
 SMALLEST_CHANGE = 1e-14
 """Smallest change of initial states from which slopes are computed."""
 EXTENDED = 40
@@ -310,7 +312,8 @@ class Compared:
     def evaluate(self, motion: Solution, many: Array) -> tuple[Array, Array]:
         """Return motions (B, n, 3, 3), (B, n, 3) of changes of the initial state and other numbers, (B, 6 + k)."""
         turns = Rotation.from_rotvec(many[:, :3]).as_matrix()
-        stretches, bodies = 1 + self.turned / ANGLE + len(self.scene.breaks), len(many)
+        corners = int(np.searchsorted(self.scene.breaks, self.t[-1])) if len(self.scene.breaks) else 0
+        stretches, bodies = 1 + self.turned / ANGLE + corners, len(many)
         self.effort.spend(weigh(self.scene) * stretches * (1 + bodies) / 2 + bodies * len(self.t) / ROWS_OF_EFFORT)
         return motion(self.scene.R_WB0 @ turns, self.scene.w_WB_B0 + many[:, 3:6] * self.scale, many[:, 6:], len(self.t))
 
@@ -395,7 +398,9 @@ class Compared:
                 break
             gain = 1 - (new @ new) / (now @ now)
             p, now = q, new
-            if gain < 1e-3 or np.sqrt(now @ now / len(now)) < 1e-3:  # converged, or far below the noise
+            if gain < CONVERGED or np.sqrt(now @ now / len(now)) < 1e-3:  # converged, or far below the noise
+                break
+            if damping < 1e-6 and ((axes.T @ now) ** 2).sum() < CONVERGED * (now @ now):  # no step along these slopes helps
                 break
         return p, float(now @ now)
 

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from conservative.attitude import Array, to_quaternion
+from conservative.scene import Scene
 
 from .compare import HOPELESS, LINEAR, Compared, Solution, differ, linearise, weigh
 from .explanation import Explanation, Trial, attempt
 from .mistakes.steps import INTEGRATORS, Integrator, Step
-from .solution import Equations, truth
+from .solution import Derivative, Equations, truth
 
 CHUNK, CHUNK_EFFORT = 256, 100
 """Steps after which work is counted, and their work (`Effort`)."""
@@ -21,6 +23,8 @@ ROWS, STEP_EFFORT = 400, 1.0
 """Largest number of rows that candidates are compared with, and the work of one step from all of them."""
 STEPS_AT_MOST, PARTS = 20_000, 2000
 """Largest numbers of steps of a method, over the file and between two rows."""
+MOST_KEPT = 50_000
+"""Largest number of times whose loads are kept."""
 CANDIDATES = 5
 """Number of methods that run from the first row."""
 FIRST_STEPS = 2000
@@ -29,10 +33,13 @@ FIRST_STEPS = 2000
 
 @dataclass(frozen=True, eq=False)
 class Slope:
-    """The derivative of states (7, n), at one time or at a time for each of them, s."""
+    """The derivative of states (7, n), at one time or at a time for each of them, s.
+
+    Loads at one time are kept: a method runs many times, with other initial states, over the same times.
+    """
 
     equations: Equations
-    known: dict[str, Any] = field(default_factory=dict)
+    known: dict[float, Derivative] = field(default_factory=dict)
 
     @property
     def body(self) -> Any:
@@ -43,20 +50,26 @@ class Slope:
         return y[4:] if self.body.motor is None else y[4:] - self.equations.wheel(np.atleast_1d(t))
 
     def __call__(self, t: Any, y: Array) -> Array:
-        if self.equations.steady:
-            if "slope" not in self.known:
-                self.known["slope"] = self.equations.at(np.zeros(1))
-            return self.known["slope"](y[:, :, None])[:, :, 0]
-        if np.ndim(t) == 0:
-            return self.equations.at(np.array([t]))(y[:, :, None])[:, :, 0]
-        return self.equations.at(np.asarray(t))(y[:, None])[:, 0]
+        if np.ndim(t):
+            return self.equations.at(np.asarray(t))(y[:, None])[:, 0]
+        t = 0.0 if self.equations.steady else float(t)
+        if t not in self.known:
+            if len(self.known) > MOST_KEPT:
+                self.known.clear()
+            self.known[t] = self.equations.at(np.array([t]))
+        return self.known[t](y[:, :, None])[:, :, 0]
+
+
+@lru_cache(maxsize=4)
+def slope_of(scene: Scene) -> Slope:
+    """Return the derivative of a scene, which trial runs share."""
+    return Slope(Equations(scene))
 
 
 def march(case: Compared, method: Step, parts: int) -> Solution:
     """Return the motion by a method with `parts` steps between two rows, which are equally far apart."""
-    equations = Equations(case.scene)
-    weight = weigh(case.scene)
-    f, h = Slope(equations), float(case.t[-1] - case.start) / (count_gaps(case)[-1] * parts)
+    f, weight = slope_of(case.scene), weigh(case.scene)
+    equations, h = f.equations, float(case.t[-1] - case.start) / (count_gaps(case)[-1] * parts)
 
     def motion(R: Array, w: Array, _: Array, n: int) -> tuple[Array, Array]:
         y, past, kept, numbers = equations.pack(case.start, R, w), list[Array](), list[Array](), count_gaps(case)[:n] * parts
@@ -122,13 +135,13 @@ def find_steps(case: Compared) -> Iterator[Explanation]:
 def _run_best(case: Compared, linear: Linearised) -> Iterator[Explanation]:
     """Yield motions by the methods that leave the smallest shares."""
     step_of_rows = float(np.diff(case.t).mean())
-    ranked = sorted(
-        ((*linear.best(method.step), method.key, method) for method in INTEGRATORS), key=lambda candidate: candidate[:3]
-    )
+    ranked = linear.rank()
     proven = False
     for left, parts, _, integrator in ranked[:CANDIDATES]:
-        # Few rows do not rule out a method. After an explanation, others are tried only if they leave about as little.
-        if (left > 0.5 and linear.used > 8) or (proven and left > max(0.02, 10 * ranked[0][0])):
+        # Few rows do not rule out a method, and methods that leave much more than the best one are not it.
+        if linear.used > 8 and left > min(0.5, max(0.02, 10 * ranked[0][0])):
+            continue
+        if proven and left > max(0.02, 10 * ranked[0][0]):
             continue
         if case.effort.over:
             return
@@ -138,7 +151,7 @@ def _run_best(case: Compared, linear: Linearised) -> Iterator[Explanation]:
                 if len(some.t) < len(case.t) and (some.plain.max(axis=1) <= some.allowed).all():
                     continue  # these rows do not differ from the exact motion
                 step = step_of_rows / count
-                explanation = attempt(some, by_step(integrator, count), known={"step": step})
+                explanation = attempt(some, by_step(integrator, count), known={"step": step}, ranked=True)
                 if explanation is None or explanation.share > 0.5 or len(some.t) == len(case.t):
                     break
             if explanation is None:
@@ -150,24 +163,28 @@ def _run_best(case: Compared, linear: Linearised) -> Iterator[Explanation]:
 
 
 class Linearised:
-    """The rows' differences from the exact motion, and those that a method makes, to first order."""
+    """The rows' differences from the exact motion, and those that a method makes, to first order.
 
-    def __init__(self, case: Compared) -> None:
-        self.case, equations = case, Equations(case.scene)
+    `also` (n, 6) are differences for other numbers of the scene, which are fitted beside the method.
+    """
+
+    def __init__(self, case: Compared, also: Sequence[Array] = ()) -> None:
+        self.case, self.f = case, slope_of(case.scene)
+        self.equations = self.f.equations
         self.R, self.w, self.flow = linearise(case)
         data = self.R if case.data[0] is None else case.data[0], self.w if case.data[1] is None else case.data[1]
-        self.wanted = differ(self.R, self.w, *data, case.scale)
-        size = np.linalg.norm(self.wanted, axis=1)
+        self.away = differ(self.R, self.w, *data, case.scale)
+        size = np.linalg.norm(self.away, axis=1)
         self.used = int(np.argmax(size > LINEAR)) if (size > LINEAR).any() else len(size)
         self.used = min(max(self.used, min(len(size), 8)), ROWS)
         have = [x is not None for x in case.data]
         self.weights = np.repeat(np.array(have) / case.noise, 3)
-        self.f, self.equations = Slope(equations), equations
         self.inverse = np.linalg.pinv(self.flow[: self.used])
         self.made: dict[tuple[int, int], Array] = {}
         free = list(case.free) if (case.error.max(axis=1) <= HOPELESS * case.noise * case.growth).any() else []
-        self.starts = np.stack([(self.flow[: self.used, :, k] * self.weights).ravel() for k in free], axis=1) if free else None
-        self.wanted = self.beside_start(self.wanted)
+        beside = [*(self.flow[:, :, k] for k in free), *also]
+        self.starts = np.stack([(x[: self.used] * self.weights).ravel() for x in beside], axis=1) if beside else None
+        self.wanted = self.beside_start(self.away)
 
     def errors(self, method: Step, parts: int) -> Array:
         """Return the errors (n, 6) of a method in the rows that are used."""
@@ -229,6 +246,11 @@ class Linearised:
             parts = int(np.clip(np.rint(wanted), 1, most))
         return min((left, n) for n, left in shares.items())
 
+    def rank(self) -> list[tuple[float, int, str, Integrator]]:
+        """Return integrators with the shares that they leave, smallest first, and their numbers of steps between two rows."""
+        ranked = ((*self.best(method.step), method.key, method) for method in INTEGRATORS)
+        return sorted(ranked, key=lambda candidate: candidate[:3])
+
     def others(self, method: Step, parts: int) -> list[int]:
         """Return the numbers of steps next to the best one that leave almost as little."""
         near = [n for n in (parts - 1, parts + 1) if n >= 1]
@@ -243,9 +265,10 @@ class RowByRow(Linearised):
     """
 
     def __init__(self, case: Compared) -> None:
-        self.case, self.equations = case, Equations(case.scene, most=case.most)
+        self.case, self.f = case, slope_of(case.scene)
+        self.equations = Equations(case.scene, most=case.most)
         self.used = n = min(len(case.t), 200)
-        self.f, self.made, self.starts = Slope(self.equations), {}, None
+        self.made, self.starts = {}, None
         R, w = case.data
         assert R is not None
         assert w is not None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -108,7 +108,7 @@ class Equations:
         mode, tensor = picard.HALF_TURNED if self.half_turned else picard.USUAL, J
         if self.fixed is not None:
             mode, tensor = picard.FIXED, np.ascontiguousarray(self.fixed)
-            inverse = np.linalg.inv(tensor)
+            inverse = np.linalg.inv(tensor).astype(float)
         spinning, side = J if self.spinning is None else np.ascontiguousarray(self.spinning), -1.0 if self.left else 1.0
         factors = np.empty((bodies, 4))
         for i, factor in enumerate((self.gyroscopic, self.field, self.damping, self.turn)):
@@ -210,6 +210,31 @@ class Flow:
         return R, w
 
 
+def integrate_rates(rates: Callable[[Array], Array], ends: Array, t: Array) -> Array:
+    """Return attitudes (n, 3, 3) at times (n,), s, that begin at the identity and have given rates, rad/s, body axes.
+
+    `rates` returns rates (..., 3) at times (...). They are smooth between `ends` (m,), s, the first of which is the start.
+    All stretches are integrated at once by Picard's iteration, from the identity each, and then joined.
+    """
+    half = np.diff(ends)[:, None] / 2
+    w = np.moveaxis(rates(ends[:-1, None] + half * (_X + 1)), -1, 0) / 2
+    q = np.zeros((4, *w.shape[1:]))
+    q[0] = 1.0
+    for _ in range(SWEEPS):
+        a, v = q[0], q[1:]
+        slope = np.concatenate([-(v * w).sum(axis=0)[None], a * w + cross(v, w)])
+        before, q = q, half * (slope @ _INTEGRAL_T)
+        q[0] += 1.0
+        if np.abs(q - before).max() < _EPS:
+            break
+    joined = [np.eye(3)]
+    for turn in _matrix(q[..., -1]):
+        joined.append(joined[-1] @ turn)
+    place = np.clip(np.searchsorted(ends, t, side="left") - 1, 0, len(half) - 1)
+    series, x = np.moveaxis(q @ _COEFFICIENTS.T, -1, 0)[:, :, place], (t - ends[place]) / half[place, 0] - 1
+    return np.array(joined)[place] @ _matrix(chebyshev.chebval(x, series, tensor=False))
+
+
 @dataclass(frozen=True, eq=False)
 class Derivative:
     """The derivative of states (7, B, n) at n times. `own` are torques of the state."""
@@ -217,10 +242,13 @@ class Derivative:
     equations: Equations
     loads: picard.AtTimes
     own: list[Torque]
+    terms: dict[int, picard.Terms] = field(default_factory=dict)
 
     def __call__(self, y: Array) -> Array:
         out, y = np.empty(y.shape), np.ascontiguousarray(y)
-        picard.slopes(self.equations.law, self.equations.terms(y.shape[1]), self._with_own(y), y, out)
+        if y.shape[1] not in self.terms:
+            self.terms[y.shape[1]] = self.equations.terms(y.shape[1])
+        picard.slopes(self.equations.law, self.terms[y.shape[1]], self._with_own(y), y, out)
         return out
 
     def sweep(self, y: Array, half: float, tolerance: float) -> tuple[Array, int]:

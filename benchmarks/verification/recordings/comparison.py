@@ -114,6 +114,7 @@ def prepare(scene: Scene, recording: Recording, from_row: bool, error: float | N
         allowed.noise,
         tuple(free) if inexact else (),
         rounded=tuple(allowed.rounded.tolist()),
+        flipped=recording.flipped,
     )
     return Rows(recording, case, allowed, noise, resolved, notes)
 

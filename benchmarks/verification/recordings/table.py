@@ -18,7 +18,7 @@ from conservative.errors import BadInput
 
 from ..solution import States
 from .also import Other, compare_others
-from .attitudes import convert
+from .attitudes import convert, find_flips
 from .columns import choose
 from .digits import find_digits
 from .formats import open_table
@@ -37,8 +37,8 @@ class Recording:
     `unit_errors` (n,) are measured before attitudes are repaired: norms of quaternions minus 1, or |R'R - 1| of matrices.
     `order_known` is False if the order of quaternions is a guess. `digits` are the largest round-off of times, s, attitudes,
     rad, and rates, rad/s, that the digits in the file stand for. `path` is None for a motion that is not a file. `numbers` (n,)
-    are rows in the file, from 1, `left_out` has the numbers of rows that were left out by reason, and `empty_at_end` is the
-    number of rows without numbers at the end. `others` are attitudes in other columns.
+    are rows in the file, from 1, `flipped` (n,) is True in rows in which the quaternion changes its sign, `left_out` has the
+    numbers of rows that were left out by reason, and `empty_at_end` is the number of rows without numbers at the end. `others` are attitudes in other columns.
     """
 
     t: Array
@@ -52,6 +52,7 @@ class Recording:
     options: Options = field(default_factory=Options)
     path: Path | None = None
     numbers: Any = None
+    flipped: Any = None
     left_out: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
     empty_at_end: int = 0
     others: Sequence[Other] = ()
@@ -161,6 +162,7 @@ def _read(path: Path, options: Options) -> tuple[Recording, dict[str, BadInput]]
         options=options,
         path=path,
         numbers=np.concatenate(numbers),
+        flipped=find_flips(raw[:, :width], layout),
         left_out={reason: count for reason, count in cleaner.left_out.items() if count},
         empty_at_end=cleaner.empty_at_end,
         others=compare_others(data[0], raw[:, width:], layout, options),
