@@ -617,7 +617,7 @@ def _turned_axes(case: Compared, asked: _Asked) -> Explanations:
     yield _best_turn(case, compose(BY_KEY["body axes"]))
 
 
-def _best_turn(case: Compared, trial: Trial) -> Explanation:
+def _best_turn(case: Compared, trial: Trial) -> Explanation | None:
     near, turns = case.first(3.0, 10), Rotation.create_group("O").as_rotvec()
     motion = trial.build(near)
     assert motion is not None
@@ -625,7 +625,11 @@ def _best_turn(case: Compared, trial: Trial) -> Explanation:
     left = np.linalg.norm(near.differences(*motion(*many, turns, len(near.t))), axis=(1, 2))
     explanations = [attempt(case, trial, turns[k].tolist(), most=30) for k in np.argsort(left, kind="stable")[:3]]
     shortest = [_shortest_turn(explanation) for explanation in explanations if explanation is not None]
-    return min(shortest, key=lambda explanation: (round(explanation.share, 3), np.linalg.norm([*explanation.values.values()])))
+    return min(
+        shortest,
+        key=lambda explanation: (round(explanation.share, 3), np.linalg.norm([*explanation.values.values()])),
+        default=None,
+    )
 
 
 def _shortest_turn(explanation: Explanation) -> Explanation:
