@@ -38,7 +38,8 @@ class Recording:
     `order_known` is False if the order of quaternions is a guess. `digits` are the largest round-off of times, s, attitudes,
     rad, and rates, rad/s, that the digits in the file stand for. `path` is None for a motion that is not a file. `numbers` (n,)
     are rows in the file, from 1, `flipped` (n,) is True in rows in which the quaternion changes its sign, `left_out` has the
-    numbers of rows that were left out by reason, and `empty_at_end` is the number of rows without numbers at the end. `others` are attitudes in other columns.
+    numbers of rows that were left out by reason, and `empty_at_end` is the number of rows without numbers at the end. `others`
+    are attitudes in other columns.
     """
 
     t: Array
