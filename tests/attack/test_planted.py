@@ -27,7 +27,12 @@ PUBLISHED = range(10_000, 11_000)
 """Seeds of the page, which nobody saw before the last changes of the verification."""
 QUICK = (0, 1, 2, 3)
 """Seeds of quick files of many kinds."""
-SEVERE = ("right files called wrong", "wrong files called right", "false names, of the answers with a name", "no answer, or a crash")
+SEVERE = (
+    "right files called wrong",
+    "wrong files called right",
+    "false names, of the answers with a name",
+    "no answer, or a crash",
+)
 
 
 @pytest.mark.parametrize("seed", sampled(QUICK, 25))
@@ -38,7 +43,9 @@ def test_files_with_and_without_a_mistake_are_judged_as_was_decided(seed, tmp_pa
 
 def _attacked(cache):
     """Return the rows of the published seeds, or of others; they outlive an interrupted attack of the same code."""
-    sources = sorted(path for root in (Path(verification.__file__).parent, Path(tables.__file__).parent) for path in root.rglob("*.py"))
+    sources = sorted(
+        path for root in (Path(verification.__file__).parent, Path(tables.__file__).parent) for path in root.rglob("*.py")
+    )
     code = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()[:12]
     first = PUBLISHED.start if SEED == 1 else 1_000_000 * SEED
     return run.run_all(Path(cache.mkdir("planted")) / f"{code}.jsonl", range(first, first + count(len(PUBLISHED))))
@@ -68,7 +75,9 @@ def test_digest_of_the_generator_ignores_comments_and_not_code(tmp_path, monkeyp
         (tmp_path / f"{name}.py").write_text((tables.HERE / f"{name}.py").read_text(encoding="utf-8") + "\n# a comment\n")
     monkeypatch.setattr(tables, "HERE", tmp_path)
     assert tables.generator() == before
-    (tmp_path / "decide.py").write_text((tmp_path / "decide.py").read_text(encoding="utf-8").replace("WRONG, ", "WRONG, ", 1) + "\nx = 1\n")
+    (tmp_path / "decide.py").write_text(
+        (tmp_path / "decide.py").read_text(encoding="utf-8").replace("WRONG, ", "WRONG, ", 1) + "\nx = 1\n"
+    )
     assert tables.generator() != before
 
 
@@ -108,7 +117,11 @@ def test_exact_motions_of_the_generator_solve_euler_equations(need):
         T = T + (R.T @ M if world.axes == "world" else M)
         if world.field is not None:
             kind, *numbers = world.field
-            C = Rotation.from_rotvec(0 if world.orbit is None else world.orbit[0] * s * world.orbit[1]).as_matrix() if world.orbit else np.eye(3)
+            C = (
+                Rotation.from_rotvec(0 if world.orbit is None else world.orbit[0] * s * world.orbit[1]).as_matrix()
+                if world.orbit
+                else np.eye(3)
+            )
             B = R.T @ C  # from axes that turn with the field to body axes
             if kind == "gradient":
                 n, K, u = numbers

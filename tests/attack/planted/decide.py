@@ -18,7 +18,7 @@ import numpy as np
 
 from . import motion
 from .layouts import LAYOUTS
-from .mistakes import ATTITUDES, BOTH, NUMBERS, SCENES, STEPS, integrate, march, other_orbit
+from .mistakes import ATTITUDES, BOTH, DRIFTS, NUMBERS, SCENES, STEPS, integrate, march, other_orbit
 from .worlds import Draw, World, is_table, scaled
 
 FLOOR, WRONG, IDENTIFIABLE = 1e-9, 3.0, 10.0
@@ -30,6 +30,8 @@ CLOSE = 300.0
 """Difference, in grains, above which another mistake is not taken for a long step, or for times that scatter."""
 SMALL, MOST = 1e-6, 8
 """Changes for slopes, and the largest number of steps of a fit."""
+MOST_BIASED = 150
+"""Largest number of rows with which the drift of a bias is fitted, which takes long."""
 Build = Callable[[Any, Any, int], Any]
 """From an initial state (7,), numbers (k,) and n to the first rows (n, 7)."""
 FARTHEST = 1.5
@@ -284,22 +286,25 @@ def rates_and_attitudes(rows: Rows) -> Iterator[tuple[str, int, Callable[[Any, A
         c = np.broadcast_to(motion.turn(p), (len(Z), 4))
         return np.hstack([motion.times(Z[:, :4], c), motion.spin(motion.back(c), Z[:, 4:])])
 
-    def drift(Z: Any, y: Any, p: Any) -> Any:
-        return np.hstack([motion.times(Z[:, :4], motion.turn(np.outer((t[: len(Z)] - at) * scale, p))), Z[:, 4:]])
+    def drifting(change: Any, axis: Any) -> Any:
+        return lambda Z, y, p: np.hstack([change(world, t[: len(Z)], Z, scale * p * axis), Z[:, 4:]])
 
     yield "rates at other times", 1, late
     yield "size of the rates", 1, lambda Z, y, p: np.hstack([Z[:, :4], Z[:, 4:] * (1 + p[0])])
     yield "bias of the rates", 3, lambda Z, y, p: np.hstack([Z[:, :4], Z[:, 4:] + scale * p])
     yield "rates in turned axes", 3, turned
     yield "body axes", 3, axes
-    yield "constant turn", 3, drift
+    for name, change in DRIFTS.items():
+        if name != "drift of a bias" or len(t) < MOST_BIASED:
+            heading = name == "heading drift"
+            yield name, 1 if heading else 3, drifting(change, np.ones(3) if not heading else np.array([0, 0, 1.0]))
 
 
 def steps(made: Any, rows: Rows) -> Iterator[tuple[str, int, float]]:
     """Yield integrators with a long step, and rules for attitudes, whose differences are scaled, so that each has its best step."""
     world, t, y0, at, E = rows.world, rows.t, rows.y0, rows.t[0], rows.exact(rows.y0, len(rows.t))
     gap, parts = float(made.about["gap"]), int(made.about["parts"])
-    if at != 0 or not (made.kind in ("step", "attitude") or made.size < CLOSE):
+    if at != 0 or not (made.kind == "step" or made.mistake in ATTITUDES or made.size < CLOSE):
         return
     near = rows.near
 
@@ -313,12 +318,12 @@ def steps(made: Any, rows: Rows) -> Iterator[tuple[str, int, float]]:
 
     begun = world.but(q0=y0[:4], w0=y0[4:])
     index = np.rint(t / gap).astype(int)
-    for name in STEPS if made.kind != "attitude" else ():
+    for name in STEPS if made.mistake not in ATTITUDES else ():
         if name != made.mistake and not (name.startswith("Buss") and is_table(world.wheel)):
             Z = march(begun, name, int(index[-1]) + 1, gap, parts)[index]
             if np.isfinite(Z).all():
                 yield name, 1, scaled_size(Z)
-    if made.kind == "attitude":
+    if made.mistake in ATTITUDES:
         h = gap / parts
         w = world.solve(np.arange((near - 1) * parts + 1) * h, y0)[:, 4:]
         for name, rule in ATTITUDES.items():

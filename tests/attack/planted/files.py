@@ -17,10 +17,12 @@ from .mistakes import (
     ATTITUDES,
     ATTITUDES_ALONE,
     BOTH,
+    DRIFTS,
     HABITS,
     PAIR,
     READINGS,
     ROWS,
+    SAMPLES,
     SCENES,
     STEPS,
     TIMES,
@@ -30,6 +32,7 @@ from .mistakes import (
     march,
     needs,
     shift_times,
+    slow,
 )
 from .worlds import Draw, World, draw_world
 
@@ -38,8 +41,8 @@ MISTAKES: dict[str, tuple[tuple[str, ...], float]] = {
     "right": (("right",), 0.44),
     "scene": (tuple(SCENES), 0.19),
     "step": (tuple(STEPS), 0.13),
-    "attitude": (tuple(ATTITUDES), 0.04),
-    "reading": (tuple(READINGS), 0.08),
+    "attitude": ((*ATTITUDES, *DRIFTS), 0.05),
+    "reading": (tuple(READINGS), 0.07),
     "time": (TIMES, 0.04),
     "habit": (HABITS, 0.04),
     "rows": (ROWS, 0.03),
@@ -135,8 +138,8 @@ def fits(name: str, kind: str, mistake: str) -> bool:
         return "R" in has and "w" in has
     if mistake in ("body axes", "transposed in some rows"):
         return "R" in has
-    if mistake in ("interpolated rows", "slerp between knots"):
-        return "q" in has
+    if mistake in SAMPLES:
+        return all(part in has for part, change in zip("Rw", SAMPLES[mistake], strict=True) if change)
     if mistake in HABITS:
         return "w" in has
     return True
@@ -157,7 +160,8 @@ def plant(seed: int) -> Planted:
         world, shape = degenerate(draw, special, rate)
     coarse = kind in ("right", "scene", "reading") and draw.chance(0.15)
     per_turn = draw.between(1.05, 6.3) if coarse else draw.between(12, 40) if kind == "step" else draw.between(20, 80)
-    fewest = {"two rows": 2, "three rows": 3}.get(special, 40)
+    few = kind in ("scene", "reading", "step") and draw.chance(0.04)
+    fewest = {"two rows": 2, "three rows": 3}.get(special, draw.pick((2, 3, 5, 8, 13)) if few else 40)
     most = fewest if fewest < 40 else 1200 if kind == "step" else 2000
     n = int(np.clip(turns * per_turn, fewest, most))
     gap = float(f"{2 * math.pi / per_turn / rate:.2e}")
@@ -232,6 +236,9 @@ def simulate(draw: Draw, made: Planted, t: Any, gap: float, parts: int, rate: fl
             d = decide.differences(rows, march(world, name, n, gap, parts, normalise), np.abs(world.w0).max())
             made.about["round-off"] = float(np.sqrt(np.nanmean((d**2).sum(axis=1))))
         return rows
+    if name in DRIFTS:
+        Y = world.solve(t)
+        return np.hstack([DRIFTS[name](world, t, Y, slow(t, Y[:, 4:], draw)), Y[:, 4:]])
     if kind == "attitude":
         Y = world.solve(np.arange((n - 1) * parts + 1) * (gap / parts))
         q = integrate(ATTITUDES[name], Y[0, :4], Y[:, 4:], gap / parts, parts)
@@ -292,7 +299,9 @@ def write(draw: Draw, made: Planted, t: Any, Y: Any) -> None:
             found[kind] = float(np.sqrt(((rounded - x) ** 2).sum(axis=1).mean()))
     late = 0.0
     if layout.whole:
-        late = float(np.sqrt(np.mean([(int(k) - base - x * layout.second) ** 2 for k, x in zip(ticks, t.tolist(), strict=True)])))
+        late = float(
+            np.sqrt(np.mean([(int(k) - base - x * layout.second) ** 2 for k, x in zip(ticks, t.tolist(), strict=True)]))
+        )
         late = (late / layout.second + (1.2e-7 if layout.origin > 1e6 and layout.second == 1e9 else 0.0)) * scale
     more = made.about.get("round-off", 0.0)
     axis = math.sqrt(3) * sigma

@@ -43,8 +43,8 @@ def motor(change: Callable[[World], World]) -> Callable[[World, Draw], World | N
 
 
 def factor(draw: Draw) -> float:
-    """Return a factor that is not 1, by a thousandth to a third."""
-    return 1 + draw.sign() * draw.between(1e-3, 0.3)
+    """Return a factor that is not 1: by a third at most, and at least as the digits of a scene file."""
+    return 1 + draw.sign() * draw.between(1e-5, 0.3)
 
 
 def quadrant(given: World) -> float:
@@ -198,9 +198,7 @@ ATTITUDES: dict[str, Callable[[Any, Any, Any, float], Any]] = {
     "attitude in place, old rates": lambda q, a, b, h: in_place(q, a * h),
     "stale rates on the wrong side": lambda q, a, b, h: motion.times(motion.turn(a * h), q),
     "attitude by rotation, mean rates on the wrong side": lambda q, a, b, h: motion.times(motion.turn((a + b) / 2 * h), q),
-    "attitude by normalisation, old rates on the wrong side": lambda q, a, b, h: (
-        q + motion.times(np.append(0.0, a * h), q) / 2
-    ),
+    "attitude by normalisation, old rates on the wrong side": lambda q, a, b, h: q + motion.times(np.append(0.0, a * h), q) / 2,
 }
 
 
@@ -238,17 +236,47 @@ READINGS: dict[str, Callable[[Any, Any, Any, Draw], tuple[Any, Any]]] = {
         turned(q, w, motion.turn(draw.vector(draw.between(0.01, 2)))) if draw.chance(0.6) else (q, w[:, [1, 0, 2]] * [1, 1, -1])
     ),
     "rates in mirrored axes": lambda q, w, t, draw: (q, w * [1, 1, -1] if draw.chance(0.5) else w[:, [1, 0, 2]]),
-    "constant turn": lambda q, w, t, draw: (
-        motion.times(q, motion.turn((t - t[0])[:, None] * draw.vector(draw.between(1e-3, 0.1)) * np.linalg.norm(w, axis=1).max())),
-        w,
-    ),
     "body axes": lambda q, w, t, draw: axes_of_body(q, w, motion.turn(draw.vector(draw.between(0.01, 1.5)))),
 }  # fmt: skip
 BOTH = (
     "world rates", "body rates", "reversed rates", "size of the rates", "bias of the rates", "rates in turned axes",
-    "rates in mirrored axes", "constant turn", "transposed", "rates in degrees", "rates in radians",
+    "rates in mirrored axes", "transposed", "rates in degrees", "rates in radians",
 )  # fmt: skip
 """Readings that attitudes and rates show together."""
+
+
+def slow(t: Any, w: Any, draw: Draw) -> Any:
+    """Return the rate of a drift (3,), rad/s, which turns attitudes by a radian or so, or less."""
+    fastest = float(np.linalg.norm(w, axis=1).max())
+    return draw.vector(min(draw.between(1e-4, 0.1), 3 / (fastest * float(t[-1] - t[0]))) * fastest)
+
+
+DRIFTS: dict[str, Callable[[World, Any, Any, Any], Any]] = {
+    "drift in body axes": lambda world, t, Y, d: motion.times(Y[:, :4], motion.turn(np.outer(t - t[0], d))),
+    "drift in world axes": lambda world, t, Y, d: motion.times(motion.turn(np.outer(t - t[0], d)), Y[:, :4]),
+    "heading drift": lambda world, t, Y, d: motion.times(motion.turn(np.outer(t - t[0], d * [0, 0, 1])), Y[:, :4]),
+    "drift of a bias": lambda world, t, Y, d: biased(world, t, Y[0], d),
+}
+"""Attitudes that drift at a rate d, rad/s, against right rates."""
+FINE = 8
+"""Steps between two rows of the drift of a bias."""
+
+
+def biased(world: World, t: Any, y0: Any, d: Any) -> Any:
+    """Return the attitudes r q with q' = q (0, w) / 2 and r' = r (0, R d) / 2, so that (r q)' = r q (0, w + d) / 2."""
+    at = np.append((t[:-1, None] + np.diff(t)[:, None] * np.arange(2 * FINE) / (2 * FINE)).ravel(), t[-1])
+    q = world.solve(at, y0, t[0])[:, :4]
+    rate = motion.spin(q, np.broadcast_to(d, (len(q), 3))) / 2
+    rate = np.hstack([np.zeros((len(q), 1)), rate])
+    r, out = np.array([1.0, 0, 0, 0]), [q[0]]
+    for i in range(0, len(at) - 1, 2):
+        h = at[i + 2] - at[i]
+        a = motion.times(r, rate[i])
+        b = motion.times(r + h / 2 * a, rate[i + 1])
+        c = motion.times(r + h / 2 * b, rate[i + 1])
+        r = r + h / 6 * (a + 2 * b + 2 * c + motion.times(r + h * c, rate[i + 2]))
+        out += [motion.times(r, q[i + 2])] * ((i + 2) % (2 * FINE) == 0)
+    return np.array(out)
 
 
 def axes_of_body(q: Any, w: Any, c: Any) -> tuple[Any, Any]:
@@ -257,16 +285,28 @@ def axes_of_body(q: Any, w: Any, c: Any) -> tuple[Any, Any]:
 
 TIMES = ("time shift", "phase drift", "time in ms", "jittered times", "dropped rows", "rates at other times")
 HABITS = ("rate limit", "rate limit per component", "dead band", "sleep", "halt", "frozen motion")
-ROWS = ("held rows", "interpolated rows", "slerp between knots", "single rows", "first row", "transposed in some rows")
+SAMPLES = {
+    "held samples": ("held", "held"),
+    "held attitudes": ("held", ""),
+    "held rates": ("", "held"),
+    "interpolated rates": ("", "line"),
+    "interpolated quaternions and interpolated rates": ("line", "line"),
+    "attitudes by slerp and interpolated rates": ("slerp", "line"),
+    "attitudes by slerp": ("slerp", ""),
+}
+"""What a recorder makes of attitudes and rates between right samples."""
+ROWS = (*SAMPLES, "held rows", "single rows", "first row", "transposed in some rows")
 PAIR = "two mistakes"
 NUMBERS = {
     **dict.fromkeys([name for name in SCENES if name.startswith("size of")], 1),
     **dict.fromkeys(("rate of the orbit", "damping", "speed of attitudes", "size of the rates", "time shift"), 1),
     **dict.fromkeys((*STEPS, *ATTITUDES), 1),
-    **dict.fromkeys(("bias of the rates", "rates in turned axes", "rates in mirrored axes", "body axes", "constant turn"), 3),
+    **dict.fromkeys(("bias of the rates", "rates in turned axes", "rates in mirrored axes", "body axes"), 3),
+    **dict.fromkeys(("drift in body axes", "drift in world axes", "drift of a bias"), 3),
     **dict.fromkeys(("rates at other times", "rate limit", "rate limit per component", "dead band", "sleep", "halt"), 1),
+    **dict.fromkeys((*SAMPLES, "held rows", "transposed in some rows"), 2),
     "phase drift": 2, "other moments": 3, "another body": 6, "jittered times": 99, "dropped rows": 4, "single rows": 3,
-    "held rows": 2, "interpolated rows": 2, "slerp between knots": 2, "transposed in some rows": 2,
+    "heading drift": 1,
 }  # fmt: skip
 """Fitted numbers of a mistake, beside the initial state; 0 if it is not here."""
 
@@ -323,18 +363,12 @@ def habit(draw: Draw, name: str, world: World, n: int, gap: float, parts: int) -
 def change_rows(draw: Draw, name: str, Y: Any, scale: float) -> Any:
     """Return the rows of a recorder that changes right ones."""
     n, Y = len(Y), Y.copy()
-    if name in ("held rows", "interpolated rows", "slerp between knots"):
+    if name in SAMPLES:
+        return resampled(Y, int(draw.random.integers(2, 9)), *SAMPLES[name])
+    if name == "held rows":
         m = int(draw.random.integers(2, 9))
-        Y[:, :4] *= np.cumprod(np.append(1.0, np.sign((Y[1:, :4] * Y[:-1, :4]).sum(axis=1))))[:, None]
-        a = np.arange(n) // m * m
-        b = np.minimum(a + m, (n - 1) // m * m)
-        s = np.where(b > a, (np.arange(n) - a) / m, 0.0)[:, None]
-        if name == "held rows":
-            return Y[a]
-        out = Y[a] + s * (Y[b] - Y[a])
-        if name == "slerp between knots":
-            out[:, :4] = motion.times(Y[a, :4], motion.turn(s * motion.vector(motion.times(motion.back(Y[a, :4]), Y[b, :4]))))
-        return out[: (n - 1) // m * m + 1]
+        Y[m::m] = Y[m - 1 : n - 1 : m]
+        return Y
     if name == "first row":
         Y[0] = np.append(motion.times(Y[0, :4], motion.turn(draw.vector(0.1))), Y[0, 4:] + 0.1 * scale * draw.vector())
         return Y
@@ -346,3 +380,18 @@ def change_rows(draw: Draw, name: str, Y: Any, scale: float) -> Any:
         Y[row, 4:] += scale * draw.vector(draw.between(0.1, 10))
         Y[row, :4] = motion.times(Y[row, :4], motion.turn(draw.vector(draw.random.uniform(0.1, 2))))
     return Y
+
+
+def resampled(Y: Any, m: int, attitudes: str, rates: str) -> Any:
+    """Return rows of a recorder that has every m-th of them, up to the last one that it has."""
+    Y = Y[: (len(Y) - 1) // m * m + 1].copy()
+    Y[:, :4] *= np.cumprod(np.append(1.0, np.where((Y[1:, :4] * Y[:-1, :4]).sum(axis=1) < 0, -1.0, 1.0)))[:, None]
+    a = np.arange(len(Y)) // m * m
+    b, share = np.minimum(a + m, len(Y) - 1), ((np.arange(len(Y)) - a) / m)[:, None]
+    out, line = Y.copy(), Y[a] + share * (Y[b] - Y[a])
+    if attitudes:
+        turn = motion.turn(share * motion.vector(motion.times(motion.back(Y[a, :4]), Y[b, :4])))
+        out[:, :4] = {"held": Y[a, :4], "line": line[:, :4], "slerp": motion.times(Y[a, :4], turn)}[attitudes]
+    if rates:
+        out[:, 4:] = {"held": Y[a, 4:], "line": line[:, 4:]}[rates]
+    return out

@@ -33,7 +33,9 @@ ALIASES: dict[str, tuple[str, ...]] = {
     "rates in degrees": ("size of the rates",),
     "rates in radians": ("size of the rates",),
     "reversed rates": ("size of the rates", "rates in mirrored axes"),
-    "slerp between knots": ("interpolated rows",),
+    "held rows": ("held samples",),
+    "held samples": ("held rows",),
+    "interpolated quaternions and interpolated rates": ("interpolated matrices and interpolated rates",),
     "dropped rows": ("jittered times",),
     "time shift": ("phase drift",),
     "time in ms": ("phase drift",),
@@ -49,6 +51,9 @@ LOOSE: dict[str, tuple[str, ...]] = {
     "first row": ("single rows",),
     "transposed in some rows": ("some rows", "single rows"),
     "held rows": ("some rows", "jittered times"),
+    "held samples": ("some rows", "jittered times"),
+    "drift in body axes": ("bias of the rates",),
+    "drift of a bias": ("bias of the rates",),
 }
 """True statements that do not name the mistake."""
 
