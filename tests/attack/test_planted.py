@@ -2,8 +2,8 @@
 
 No right file is called wrong, no wrong file right, and no name is false. Of the mistakes that a file determines 99 of 100 are
 named. `pytest` verifies the files of `QUICK`, `pytest --all` more, and `pytest --attack` the 1,000 of the page
-`reports/documentation/planted_files.md`, whose rates have to be in the intervals of the page. An interrupted attack goes on where
-it was, unless the code has changed. By hand:
+`reports/documentation/planted_files.md`, whose rates have to be in the intervals of the page. An interrupted attack goes on
+where it was, unless the code has changed. By hand:
 
     python -m tests.attack.planted results.jsonl 10000 11000 --page
 """

@@ -1,16 +1,16 @@
 """What the answer to a file should be: decided by the generator from its own motions, before the verification runs.
 
 The grain of a file is the root mean square, in a row, of noise, digits and single precision, at least 1e-9: of attitudes, rad,
-and of rates, relative to the largest. A file is wrong if it differs from every exact motion by more than `WRONG` grains (root mean
-square over the rows; motions start in the first row, or, with noise or digits, as fits best). A mistake is identifiable if it
-differs by more than `IDENTIFIABLE` grains from the right motion and from every rival with as few fitted numbers: other mistakes,
-whose numbers fit best.
+and of rates, relative to the largest. A file is wrong if it differs from every exact motion by more than `WRONG` grains (root
+mean square over the rows). These motions start in the first row, or, with noise or digits, as fits best. A mistake is
+identifiable if it differs by more than `IDENTIFIABLE` grains from the right motion, and from every rival with as few fitted
+numbers: another mistake, whose numbers fit best.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -18,7 +18,7 @@ import numpy as np
 
 from . import motion
 from .layouts import LAYOUTS
-from .mistakes import ATTITUDES, BOTH, DRIFTS, NUMBERS, SCENES, STEPS, integrate, march, other_orbit
+from .mistakes import ATTITUDES, DRIFTS, NUMBERS, SCENES, STEPS, integrate, march, other_orbit
 from .worlds import Draw, World, is_table, scaled
 
 FLOOR, WRONG, IDENTIFIABLE = 1e-9, 3.0, 10.0
@@ -196,41 +196,53 @@ def decide(made: Any, t: Any, Y: Any) -> None:
 
 def rivals(made: Any, rows: Rows) -> Iterator[tuple[str, int, float]]:
     """Yield other explanations: a name, the number of its fitted numbers, and what they leave of the differences, in grains."""
-    world, t, y0, at = rows.world, rows.t, rows.y0, rows.t[0]
-    n = len(t)
-    # The scene: parts that are missing or reversed.
-    for name, change in SCENES.items():
-        if NUMBERS.get(name, 0) == 0 and name != made.mistake and (other := change(world, Draw(0))) is not None:
-            yield name, 0, rows.fit(0, lambda y, p, k, other=other: other.solve(t[:k], y, at))
-    for name, numbers, vary in varied(world, rows.scale):
+    for name, numbers, build in explanations(rows):
         if name != made.mistake:
-            yield name, numbers, rows.fit(numbers, lambda y, p, k, vary=vary: vary(p).solve(t[:k], y, at))
-    # Times: along the motion.
+            yield name, numbers, rows.fit(numbers, build)
+    if made.mistake == "dropped rows" or made.size < CLOSE:
+        yield "jittered times", 99, along_the_motion(rows)
+    yield from steps(made, rows)
+    if len(rows.kept) == 6 and made.kind != "step":
+        yield from readings(made, rows)
+
+
+def explanations(rows: Rows) -> Iterator[tuple[str, int, Build]]:
+    """Yield explanations that can be fitted: a name, the number of its numbers, and its rows."""
+    world, at, t = rows.world, rows.t[0], rows.t
+    for name, change in SCENES.items():  # parts that are missing or reversed
+        if NUMBERS.get(name, 0) == 0 and (other := change(world, Draw(0))) is not None:
+            yield name, 0, lambda y, p, k, other=other: other.solve(t[:k], y, at)
+    for name, numbers, vary in varied(world, rows.scale):
+        yield name, numbers, lambda y, p, k, vary=vary: vary(p).solve(t[:k], y, at)
     elapsed = t - at
     shifted: dict[str, tuple[int, Any]] = {
         "time shift": (1, lambda p: np.where(elapsed > 0, elapsed + p[0] / rows.scale, 0.0)),
         "phase drift": (2, lambda p: elapsed * (1 + p[1]) + p[0] / rows.scale),
     }
     for name, (numbers, times) in shifted.items():
-        if name != made.mistake:
-            yield name, numbers, rows.fit(numbers, lambda y, p, k, times=times: solve_any(world, at + times(p)[:k], y, at))
+        yield name, numbers, lambda y, p, k, times=times: solve_any(world, at + times(p)[:k], y, at)
     if len(rows.kept) == 6:
         for name, numbers, change in rates_and_attitudes(rows):
-            if name != made.mistake:
-                yield name, numbers, rows.fit(numbers, lambda y, p, k, change=change: change(rows.exact(y, k), y, p))
-    if made.mistake == "dropped rows" or made.size < CLOSE:
-        late = rows.off(solve_any(world, t + SMALL / rows.scale, y0, at)) - rows.d
-        a, b = rows.d.reshape(n, -1), late.reshape(n, -1)
-        along = (a * b).sum(axis=1, keepdims=True) / np.maximum((b * b).sum(axis=1, keepdims=True), 1e-300)
-        yield "jittered times", 99, rows.size((a - along * b).ravel())
-    yield from steps(made, rows)
-    # Other readings: what the file means by them is an exact motion.
-    for name in BOTH if len(rows.kept) == 6 and made.kind != "step" else ():
-        if name in UNREAD and name != made.mistake:
+            yield name, numbers, lambda y, p, k, change=change: change(rows.exact(y, k), y, p)
+
+
+def along_the_motion(rows: Rows) -> float:
+    """Return what another time for each row leaves, to first order."""
+    late = rows.off(solve_any(rows.world, rows.t + SMALL / rows.scale, rows.y0, rows.t[0])) - rows.d
+    a, b = rows.d.reshape(len(rows.t), -1), late.reshape(len(rows.t), -1)
+    along = (a * b).sum(axis=1, keepdims=True) / np.maximum((b * b).sum(axis=1, keepdims=True), 1e-300)
+    return rows.size((a - along * b).ravel())
+
+
+def readings(made: Any, rows: Rows) -> Iterator[tuple[str, int, float]]:
+    """Yield other readings: what the file means by them is an exact motion."""
+    for name in UNREAD:
+        if name != made.mistake:
             Z = np.hstack(UNREAD[name](rows.Y[:, :4], rows.Y[:, 4:]))
-            few = Rows(world, t[:3], Z[:3], Z[0], rows.kept, rows.grain, rows.scale, rows.inexact)
+            meant = replace(rows, Y=Z, y0=Z[0])
+            few = replace(meant, t=rows.t[:3], Y=Z[:3])
             if few.size(few.d) < 30 * IDENTIFIABLE:
-                yield name, 0, Rows(world, t, Z, Z[0], rows.kept, rows.grain, rows.scale, rows.inexact).fit()
+                yield name, 0, meant.fit()
 
 
 def solve_any(world: World, t: Any, y: Any, at: float) -> Any:
@@ -301,7 +313,7 @@ def rates_and_attitudes(rows: Rows) -> Iterator[tuple[str, int, Callable[[Any, A
 
 
 def steps(made: Any, rows: Rows) -> Iterator[tuple[str, int, float]]:
-    """Yield integrators with a long step, and rules for attitudes, whose differences are scaled, so that each has its best step."""
+    """Yield integrators, and rules for attitudes. Their differences are scaled, so that each has its best step."""
     world, t, y0, at, E = rows.world, rows.t, rows.y0, rows.t[0], rows.exact(rows.y0, len(rows.t))
     gap, parts = float(made.about["gap"]), int(made.about["parts"])
     if at != 0 or not (made.kind == "step" or made.mistake in ATTITUDES or made.size < CLOSE):

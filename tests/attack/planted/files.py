@@ -49,6 +49,8 @@ MISTAKES: dict[str, tuple[tuple[str, ...], float]] = {
     "pair": ((PAIR,), 0.01),
 }
 """Kinds of mistakes, their names and shares."""
+BY_LETTER = ("quaternions wxyz", "quaternions xyzw", "PlotJuggler", "MuJoCo", "JSON lines", "TUM")
+"""Layouts whose names or format define the order of quaternions."""
 FEWEST_TICKS = 50
 """Smallest distance of rows in units of whole time stamps."""
 SPECIAL = ("at rest", "one axis", "two rows", "three rows", "ball", "constant")
@@ -121,28 +123,20 @@ def has_times(layout: Layout, world: World, gap: float, coarse: bool) -> bool:
 def fits(name: str, kind: str, mistake: str) -> bool:
     """Return whether a layout can show a mistake."""
     layout = LAYOUTS[name]
-    has = layout.has.split()
-    if mistake in ("order xyzw", "order wxyz"):
-        return "q" in has and name in ("quaternions wxyz", "quaternions xyzw", "PlotJuggler", "MuJoCo", "JSON lines", "TUM")
-    if mistake == "rates in degrees":
-        return "w" in has and "R" in has and layout.unit == 1
-    if mistake == "rates in radians":
-        return "w" in has and "R" in has and layout.unit == DEG
-    if mistake == "world rates":
-        return "w" in has and "R" in has and "rates" not in layout.options
-    if mistake == "body rates":
-        return layout.options.get("rates") == "world"
-    if mistake == "time in ms":
-        return layout.names[:1] in (("time (s)",), ('"Time (s)"',))
-    if mistake in BOTH or kind == "attitude" or mistake == "rates at other times" or mistake in ATTITUDES_ALONE:
-        return "R" in has and "w" in has
-    if mistake in ("body axes", "transposed in some rows"):
-        return "R" in has
-    if mistake in SAMPLES:
-        return all(part in has for part, change in zip("Rw", SAMPLES[mistake], strict=True) if change)
-    if mistake in HABITS:
-        return "w" in has
-    return True
+    has = {*layout.has.split()}
+    needed = {"R", "w"} if kind == "attitude" or mistake in (*BOTH, *ATTITUDES_ALONE, "rates at other times") else set()
+    needed |= {"w"} if mistake in HABITS else {"R"} if mistake in ("body axes", "transposed in some rows") else set()
+    needed |= {part for part, change in zip("Rw", SAMPLES.get(mistake, ("", "")), strict=True) if change}
+    special = {
+        "order xyzw": name in BY_LETTER,
+        "order wxyz": name in BY_LETTER,
+        "rates in degrees": layout.unit == 1,
+        "rates in radians": layout.unit == DEG,
+        "world rates": "rates" not in layout.options,
+        "body rates": layout.options.get("rates") == "world",
+        "time in ms": layout.names[:1] in (("time (s)",), ('"Time (s)"',)),
+    }
+    return needed <= has and special.get(mistake, True)
 
 
 def plant(seed: int) -> Planted:
@@ -173,8 +167,10 @@ def plant(seed: int) -> Planted:
     names = [name for name in LAYOUTS if fits(name, kind, mistake) and has_times(LAYOUTS[name], world, gap, coarse)]
     layout = draw.pick(names)
     made = Planted(seed, kind, mistake, world, layout, noise)
-    made.about |= {"turns": round(turns, 3), "shape": shape, "special": special, "per turn": per_turn, "parts": parts, "gap": gap,
-                   "rate": rate, "parts of the scene": ", ".join(features(world))}  # fmt: skip
+    made.about |= {
+        "turns": round(turns, 3), "shape": shape, "special": special, "per turn": per_turn, "parts": parts, "gap": gap,
+        "rate": rate, "parts of the scene": ", ".join(features(world)),
+    }  # fmt: skip
     t = gap * np.arange(n)
     stamped = t
     if kind in ("right", "scene") and not coarse and draw.chance(0.15) and n > 5:  # rows at irregular times, with their stamps
@@ -201,7 +197,7 @@ def plant(seed: int) -> Planted:
 
 def degenerate(draw: Draw, special: str, rate: float) -> tuple[World, str]:
     """Return a world that hardly moves: a body at rest, or one that turns about a principal axis."""
-    world, _, shape = draw_world(draw, "", "principal")
+    world, *_ = draw_world(draw, "", "principal")
     free = World(world.J, world.q0, world.w0)
     if special == "one axis":
         return free.but(w0=rate * draw.sign() * np.eye(3)[draw.random.integers(3)]), "about a principal axis"
@@ -223,42 +219,40 @@ def features(world: World) -> list[str]:
 def simulate(draw: Draw, made: Planted, t: Any, gap: float, parts: int, rate: float) -> Any:
     """Return the states in the rows of a file, without noise."""
     world, name, kind, n = made.world, made.mistake, made.kind, len(t)
-    if kind == "scene":
-        other = SCENES[name](world, draw)
+    if kind in ("scene", "pair"):
+        other = SCENES["another body" if kind == "pair" else name](world, draw)
         assert other is not None
-        made.about["other"] = other
+        if kind == "pair":
+            made.about["pair"] = ("another body", "damping")
+            other = other.but(drag=draw.between(1e-3, 0.03) * rate)
         return other.solve(t)
     if kind == "step":
-        normalise = draw.chance(0.7) or "q" not in LAYOUTS[made.layout].has
-        made.about["normalise"] = normalise
-        rows = march(world, name, n, gap, parts, normalise, made.noise == "single")
-        if made.noise == "single":
-            d = decide.differences(rows, march(world, name, n, gap, parts, normalise), np.abs(world.w0).max())
-            made.about["round-off"] = float(np.sqrt(np.nanmean((d**2).sum(axis=1))))
-        return rows
-    if name in DRIFTS:
-        Y = world.solve(t)
-        return np.hstack([DRIFTS[name](world, t, Y, slow(t, Y[:, 4:], draw)), Y[:, 4:]])
-    if kind == "attitude":
+        return simulate_steps(draw, made, n, gap, parts)
+    if name in ATTITUDES:
         Y = world.solve(np.arange((n - 1) * parts + 1) * (gap / parts))
-        q = integrate(ATTITUDES[name], Y[0, :4], Y[:, 4:], gap / parts, parts)
-        return np.hstack([q, Y[::parts, 4:]])
+        return np.hstack([integrate(ATTITUDES[name], Y[0, :4], Y[:, 4:], gap / parts, parts), Y[::parts, 4:]])
     if kind == "time" and name != "time in ms":
         return shift_times(draw, name, world, t, gap)
     if kind == "habit":
         return habit(draw, name, world, n, gap, parts)
-    if kind == "pair":
-        other = SCENES["another body"](world, draw)
-        assert other is not None
-        made.about["pair"] = ("another body", "damping")
-        return other.but(drag=draw.between(1e-3, 0.03) * rate).solve(t)
     Y = world.solve(t)
     if kind == "rows":
         return change_rows(draw, name, Y, rate)
-    if kind == "reading":
-        q, w = READINGS[name](Y[:, :4], Y[:, 4:], t, draw)
-        return np.hstack([q, w])
-    return Y
+    if name in DRIFTS:
+        return np.hstack([DRIFTS[name](world, t, Y, slow(t, Y[:, 4:], draw)), Y[:, 4:]])
+    return np.hstack(READINGS[name](Y[:, :4], Y[:, 4:], t, draw)) if kind == "reading" else Y
+
+
+def simulate_steps(draw: Draw, made: Planted, n: int, gap: float, parts: int) -> Any:
+    """Return the states of a method with long steps, and find its round-off in single precision."""
+    world, name = made.world, made.mistake
+    normalise = draw.chance(0.7) or "q" not in LAYOUTS[made.layout].has
+    made.about["normalise"] = normalise
+    rows = march(world, name, n, gap, parts, normalise, made.noise == "single")
+    if made.noise == "single":
+        d = decide.differences(rows, march(world, name, n, gap, parts, normalise), np.abs(world.w0).max())
+        made.about["round-off"] = float(np.sqrt(np.nanmean((d**2).sum(axis=1))))
+    return rows
 
 
 def finite(Y: Any) -> Any:
@@ -269,8 +263,7 @@ def finite(Y: Any) -> Any:
 
 def write(draw: Draw, made: Planted, t: Any, Y: Any) -> None:
     """Write the text of a file, find the grain of its attitudes, rad, and rates, relative to the largest, and decide."""
-    layout = LAYOUTS[made.layout]
-    Y = finite(Y)
+    layout, Y = LAYOUTS[made.layout], finite(Y)
     t = t[: len(Y)]
     sigma = float(made.noise) if made.noise.startswith("1e") else 0.0
     scale = float(np.linalg.norm(Y[:, 4:], axis=1).max()) or 1.0
@@ -278,37 +271,22 @@ def write(draw: Draw, made: Planted, t: Any, Y: Any) -> None:
     if sigma:
         q = motion.times(q, motion.turn(sigma * draw.random.normal(size=(len(q), 3))))
         w = w + sigma * scale * draw.random.normal(size=w.shape)
-    number = digits_of(made.noise)
-    ticks = t
-    if layout.second > 1:
-        ticks = t * layout.second
-    if layout.whole:
-        ticks = np.array([round(x * layout.second) for x in t.tolist()], dtype=object)
-        base = round(layout.origin * layout.second) if not made.world.in_time else 0
-        ticks = ticks + base
-    if made.mistake == "time in ms":
-        ticks = t * 1e3
-    blocks = layout.columns(q, w, t)
-    blocks = [(kind, ticks if kind in ("t", "sec") else x) for kind, x in blocks]
-    single = made.noise == "single"
-    blocks = [(kind, x.astype(np.float32) if single and kind in ("q", "w") else x) for kind, x in blocks]
-    found = {}
-    for kind, x in zip((kind for kind, _ in blocks), (x for _, x in layout.columns(q, w, t)), strict=True):
-        if kind in ("q", "w"):
-            rounded = np.array([float(number % v) for v in (x.astype(np.float32) if single else x).ravel()]).reshape(x.shape)
-            found[kind] = float(np.sqrt(((rounded - x) ** 2).sum(axis=1).mean()))
-    late = 0.0
-    if layout.whole:
-        late = float(
-            np.sqrt(np.mean([(int(k) - base - x * layout.second) ** 2 for k, x in zip(ticks, t.tolist(), strict=True)]))
-        )
-        late = (late / layout.second + (1.2e-7 if layout.origin > 1e6 and layout.second == 1e9 else 0.0)) * scale
-    more = made.about.get("round-off", 0.0)
-    axis = math.sqrt(3) * sigma
-    world_rates = layout.options.get("rates") == "world"
-    angle = math.hypot(layout.angle * found.get("q", 0.0), axis, late, more) + decide.FLOOR
-    rates = math.hypot(found.get("w", 0.0) / layout.unit / scale, axis, late, more) + decide.FLOOR
-    rates = math.hypot(rates, angle) if world_rates else rates
+    stamps, late = stamps_of(layout, t, made.world.in_time)
+    stamps = t * 1e3 if made.mistake == "time in ms" else stamps
+    number, single = digits_of(made.noise), made.noise == "single"
+    blocks, rounded = list[tuple[str, Any]](), {"q": 0.0, "w": 0.0}
+    for kind, x in layout.columns(q, w, t):
+        if kind in rounded:
+            kept = x.astype(np.float32) if single else x
+            blocks.append((kind, kept))
+            off = np.array([float(number % v) for v in kept.ravel()]).reshape(x.shape) - x
+            rounded[kind] = float(np.sqrt((off**2).sum(axis=1).mean()))
+        else:
+            blocks.append((kind, stamps if kind in ("t", "sec") else x))
+    others = math.sqrt(3) * sigma, late * scale, made.about.get("round-off", 0.0)
+    angle = math.hypot(layout.angle * rounded["q"], *others) + decide.FLOOR
+    rates = math.hypot(rounded["w"] / layout.unit / scale, *others) + decide.FLOOR
+    rates = math.hypot(rates, angle) if layout.options.get("rates") == "world" else rates
     made.about |= {"grain": (angle, rates), "scale": scale, "rows": len(t)}
     empty = np.zeros(len(t), bool)
     if made.kind in ("right", "scene", "reading") and len(t) > 60 and draw.chance(0.12):
@@ -316,8 +294,20 @@ def write(draw: Draw, made: Planted, t: Any, Y: Any) -> None:
         made.about["nan"] = int(empty.sum())
     lines = lines_of(layout, blocks, number, empty)
     if made.kind in ("right", "scene", "step", "reading") and len(t) > 20 and draw.chance(0.12):
-        twice = draw.random.choice(np.arange(1, len(t)), size=max(1, len(t) // 10), replace=False)
-        lines = [line for i, line in enumerate(lines) for line in [line] * (1 + (i in {*twice.tolist()}))]
+        twice = {*draw.random.choice(np.arange(1, len(t)), size=max(1, len(t) // 10), replace=False).tolist()}
+        lines = [line for i, line in enumerate(lines) for line in [line] * (1 + (i in twice))]
         made.about["duplicated"] = len(twice)
     made.text = file_of(layout, lines)
     decide.decide(made, t[~empty], Y[~empty])
+
+
+def stamps_of(layout: Layout, t: Any, in_time: bool) -> tuple[Any, float]:
+    """Return time stamps in the unit of a layout, and the root mean square of their rounding, s."""
+    if not layout.whole:
+        return t * layout.second if layout.second > 1 else t, 0.0
+    # Times since 1970 are not times of a scene that depends on time; whole numbers stay exact.
+    base = 0 if in_time else round(layout.origin * layout.second)
+    ticks = [round(x * layout.second) for x in t.tolist()]
+    off = np.array([tick - x * layout.second for tick, x in zip(ticks, t.tolist(), strict=True)]) / layout.second
+    far = 1.2e-7 if layout.origin > 1e6 and layout.second == 1e9 else 0.0  # in double precision, s since 1970
+    return np.array([base + tick for tick in ticks], dtype=object), float(np.sqrt((off**2).mean())) + far

@@ -24,8 +24,8 @@ class Layout:
     names
         Names of all columns.
     columns
-        From attitudes (n, 4), rates (n, 3) and times (n,), s, to blocks: ("q", values) with attitudes, ("w", values) with rates,
-        ("", values) with other values. The time comes where "t" stands.
+        From attitudes (n, 4), rates (n, 3) and times (n,), s, to blocks: ("q", values) with attitudes, ("w", values) with
+        rates, ("", values) with other values. The time comes where "t" stands, or "sec" for seconds and nanoseconds.
     has
         "q" if the quaternion is visible, "R" for attitudes, "w" for rates.
     unit
@@ -37,8 +37,8 @@ class Layout:
     angle
         Error of an angle, rad, for an error of 1 in the numbers.
     separator, comma, origin, before, after, form, ending
-        Separator of fields, decimal commas, time of the first row, s, lines before and after the header, "table", "JSON" or "lists",
-        and the ending of the file.
+        Separator of fields, decimal commas, time of the first row, s, lines before and after the header, "table", "JSON" or
+        "lists", and the ending of the file.
     unnamed
         True if nothing names the unit of whole times.
     """
@@ -129,7 +129,8 @@ LAYOUTS: dict[str, Layout] = {
     ),
     "yaw, pitch, roll": Layout(
         ("time", "yaw (deg)", "pitch (deg)", "roll (deg)", "p (deg/s)", "q (deg/s)", "r (deg/s)"),
-        lambda q, w, t: [("t", t), ("q", euler(q, "ZYX")), ("w", DEG * w)], "R w", DEG, options={"euler": "zyx"}, angle=1.5 / DEG,
+        lambda q, w, t: [("t", t), ("q", euler(q, "ZYX")), ("w", DEG * w)], "R w", DEG, options={"euler": "zyx"},
+        angle=1.5 / DEG,
     ),
     "heading, pitch, bank": Layout(
         ("t", "heading (deg)", "pitch (deg)", "bank (deg)"), lambda q, w, t: [("t", t), ("q", euler(q, "ZYX"))], "R",
@@ -255,7 +256,7 @@ def lines_of(layout: Layout, blocks: list[tuple[str, Any]], number: str, empty: 
     cells: list[list[str]] = [[] for _ in range(n)]
     for kind, values in blocks:
         if kind == "t":
-            text = [repr(int(x)) for x in values] if layout.whole else ["%.15g" % x for x in values]
+            text = [repr(int(x)) for x in values] if layout.whole else [f"{x:.15g}" for x in values]
             columns = [text]
         elif kind == "sec":
             columns = [[repr(int(x) // 10**9) for x in values], [repr(int(x) % 10**9) for x in values]]

@@ -28,8 +28,8 @@ def _place(**sizes: int) -> list[int]:
 
 
 (
-    INERTIA, INVERSE, GYROSCOPIC, FIELD, KIND, POINT, AMOUNT, REST, ANCHOR, ORBIT, NORMAL, GRADIENT, DAMPING, IN_WORLD, REACTION,
-    SPEED, SIDE, IS_FIXED, FIXED, UNFIXED, DRAG,
+    INERTIA, INVERSE, GYROSCOPIC, FIELD, KIND, POINT, AMOUNT, REST, ANCHOR, ORBIT, NORMAL, GRADIENT, DAMPING, IN_WORLD,
+    REACTION, SPEED, SIDE, IS_FIXED, FIXED, UNFIXED, DRAG,
 ) = _place(
     inertia=9, inverse=9, gyroscopic=1, field=1, kind=1, point=3, amount=1, rest=1, anchor=3, orbit=1, normal=3, gradient=9,
     damping=9, in_world=1, reaction=1, speed=1, side=1, is_fixed=1, fixed=9, unfixed=9, drag=1,
@@ -220,7 +220,7 @@ def _turn(v, h):  # type: ignore[no-untyped-def]
     return math.cos(angle / 2), s * v[0], s * v[1], s * v[2]
 
 
-# Steps: each writes the state after h. `past` (3, 7) is what a step keeps for the next one, and `number` its kind in its family.
+# Steps: each writes the state after h. `past` (3, 7) is kept for the next step, and `number` is the kind in a family.
 
 
 @njit(cache=True)
@@ -375,10 +375,10 @@ def _step(family, t, h, y, world, A, b, number, turned, known, past, new):  # ty
 
 @njit(cache=True)
 def march(y0, h, count, every, family, A, b, number, turned, normalise, single, world):  # type: ignore[no-untyped-def]
-    """Return every `every`-th of the states after `count` steps of length h from t = 0 by a textbook method; nan if it diverges.
+    """Return every `every`-th of the states after `count` steps of length h from t = 0 by a textbook method.
 
     `number` and `turned` choose in a family: the order or the number of iterations, and the exponential map. With `single` the
-    state is rounded to single precision after each step.
+    state is rounded to single precision after each step. Rows after a method diverged are nan.
     """
     rows, past, y, new = np.full((count // every + 1, 7), np.nan), np.zeros((3, 7)), y0.copy(), np.empty(7)
     rows[0] = y

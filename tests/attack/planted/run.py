@@ -106,8 +106,8 @@ def outcome(seed: int, folder: Path) -> dict[str, Any]:
         (found,) = verify([path], scene, **made.options)
         finding = found.findings[0]
         row |= {
-            "verdict": str(found.verdict), "reason given": found.reason, "named": [list(cause.keys) for cause in finding.causes],
-            "notes": [*found.notes],
+            "verdict": str(found.verdict), "reason given": found.reason,
+            "named": [list(cause.keys) for cause in finding.causes], "notes": [*found.notes],
         }  # fmt: skip
     except BadInput as error:
         row |= {"verdict": "refused", "reason given": str(error), "named": [], "notes": []}
@@ -198,7 +198,7 @@ def _work(path: Path, seeds: list[int]) -> None:
 
 
 def run_all(path: Path, seeds: Sequence[int], count: int = 2) -> list[dict[str, Any]]:
-    """Return the rows of seeds, verified in some processes. Each appends to a file of its own; `path` gets all rows at the end."""
+    """Return the rows of seeds, verified in some processes. Each appends to a file of its own; `path` gets all at the end."""
     parts = [path.with_suffix(f".{i}.jsonl") for i in range(count)]
     others = [part for part in path.parent.glob(f"{path.stem}.*.jsonl") if part not in parts]
     done = {row["seed"] for part in (path, *parts, *others) for row in load(part)}

@@ -5,7 +5,6 @@ Sizes are such that each part changes the motion by some radians within the run.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from dataclasses import field as member
 from typing import Any
@@ -54,10 +53,10 @@ class Draw:
 class World:
     """A body and what acts on it, in SI units; and changes of its equations, which scene files cannot have.
 
-    `field` is ("gravity", weight, centre), ("spring", stiffness, point, anchor, rest), ("attraction", strength, point, anchor) or
-    ("gradient", rate, inertia, direction); `orbit` is (rate, normal). `wheel` and `torque` are vectors or tables (times, values).
-    Changes: factors of the gyroscopic term, of the field, of the motor's reaction and of the rate of attitudes, the product of
-    quaternions on the other side, a drag in 1/s, a tensor that is fixed in the world.
+    `field` is ("gravity", weight, centre), ("spring", stiffness, point, anchor, rest), ("attraction", strength, point, anchor)
+    or ("gradient", rate, inertia, direction); `orbit` is (rate, normal). `wheel` and `torque` are vectors or tables (times,
+    values). Changes: factors of the gyroscopic term, of the field, of the motor's reaction and of the rate of attitudes, the
+    product of quaternions on the other side, a drag in 1/s, a tensor that is fixed in the world.
     """
 
     J: Any
