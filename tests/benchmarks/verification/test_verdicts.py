@@ -25,7 +25,6 @@ SCENE = cv.Scene("tumbler", cv.RigidBody(J), np.eye(3), W0, 10.0)
 T = np.linspace(0, 10, 501)
 R, W = free_body(SCENE.body, np.eye(3), W0, T)
 Q = Rotation.from_matrix(R).as_quat(scalar_first=True)
-EULER = Rotation.from_matrix(R).as_euler("ZYX")[:, ::-1]
 ZERO = np.zeros((len(T), 3))
 
 
