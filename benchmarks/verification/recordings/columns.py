@@ -217,14 +217,20 @@ def _by_option(path: Path, layout: Layout, text: str) -> dict[str, list[str]]:
     return chosen
 
 
-def name_columns(chosen: Mapping[str, Sequence[str]], names: Sequence[str]) -> str:
-    """Return the option `--columns` that names columns, by their numbers where names cannot be written there."""
+def name_columns(chosen: Mapping[str, Sequence[str]], names: Sequence[str], counted: bool = False) -> str:
+    """Return the option `--columns` that names columns, by their numbers where names cannot be written there.
+
+    The time is divided by 200 if it is `counted`.
+    """
 
     def short(name: str) -> str:
         plain = re.fullmatch(r"[\w./\[\]-]+", name) and not name.isdigit() and name.isascii()
         return name if plain else str(names.index(name) + 1)
 
-    parts = [f"{SHORT[kind]}={':'.join(map(short, members))}" for kind, members in chosen.items()]
+    parts = [
+        f"{SHORT[kind]}={':'.join(map(short, members))}{'/200' * (counted and kind == 'time')}"
+        for kind, members in chosen.items()
+    ]
     euler = " --euler zyx" * ("angles" in chosen and parse(chosen["angles"][0]).label in _AXES)
     return f"--columns {shlex.quote(','.join(parts))}{euler}"
 
@@ -299,10 +305,10 @@ def _hint(
         if len(chosen["rates"]) < 3:
             return "columns of attitudes or rates; --columns time=NAME,w=X:Y:Z names them"
     chosen = {"time": time} | {kind: members for kind, members in chosen.items() if kind in SHORT and kind != "time"}
-    text = name_columns(chosen, names)
     if not times and counter is not None:
-        number = name_columns({"time": time}, names).removeprefix("--columns ")
-        text = text.replace(number, f"{number}/200", 1)
-        return f"a column of times. If column {counter!r} counts rows, 200 a second: {text}"
+        return (
+            f"a column of times. If column {counter!r} counts rows, 200 a second: {name_columns(chosen, names, counted=True)}"
+        )
+    text = name_columns(chosen, names)
     units = {parse(name).unit for name in chosen.get("rates", ())}
     return f"the columns by name or number, such as {text}{' --units rad' * (None in units)}"
