@@ -88,7 +88,7 @@ class Layout:
         first = next((parse(name) for name in self.used.get("quaternion", ())), None)
         if first is None:
             return False
-        return first.label not in (*LETTERS, *"ijkr", "real") and not {"qpos", *ORDERS}.intersection(first.words)
+        return first.label not in (*LETTERS, *"ijkrs", "real", "scalar") and not {"qpos", *ORDERS}.intersection(first.words)
 
     @property
     def columns(self) -> list[str]:

@@ -73,6 +73,8 @@ READ = {
     "upper case": {"TIME": T} | block("Q*", "WXYZ", WXYZ) | block("W* [RAD/S]", "XYZ", W),
     "ijk and real": TIME | block("quat_*", ("i", "j", "k", "real"), XYZW) | RATE,
     "qr qi qj qk": TIME | block("q*", "rijk", WXYZ) | RATE,
+    "scalar s": TIME | block("q_*", "sxyz", WXYZ) | RATE,
+    "a scalar": TIME | block("quaternion *", ("x", "y", "z", "scalar"), XYZW) | RATE,
     "Euler parameters": TIME | block("e*", NUMBERS, WXYZ) | RATE,
     "camel case": {"timeStamp": T} | block("orientationQuat*", "WXYZ", WXYZ) | block("angularVelocity*", "XYZ", W),
     "blanks in names": {"Time [s]": T} | block("Quaternion *", "wxyz", WXYZ) | block("Angular Velocity * [deg/s]", "XYZ", DEG),
@@ -147,6 +149,9 @@ READ = {
     "a unit tells": {"t (s)": T} | block("g* (deg/s)", "xyz", DEG) | block("a* (m/s^2)", "xyz", NOISE),
     # angles
     "NASA axes": TIME | dict(zip(("heading (deg)", "pitch (deg)", "bank (deg)"), YPR.T, strict=True)) | RATE,
+    "short names": TIME | dict(zip(("HDG", "PCH", "RLL"), YPR.T, strict=True)) | RATE,
+    "angles by name": TIME | dict(zip(("Yaw angle (deg)", "Pitch angle (deg)", "Roll angle (deg)"), YPR.T, strict=True)) | RATE,
+    "ori": TIME | block("ori_*", "wxyz", WXYZ) | RATE,
     "roll first": TIME | block("* (deg)", RPY, YPR[:, ::-1]) | block("*_rate (deg/s)", RPY, DEG),
     "estimated angles": TIME | block("est_*_deg", RPY, YPR[:, ::-1]) | RATE,
     "an aircraft": {"t": T}
@@ -240,7 +245,8 @@ ASKED = {
     "PX4 rates": {"timestamp": T + 2e-4, "timestamp_sample": T}
     | block("xyz[*]", "012", W)
     | block("xyz_derivative[*]", "012", NOISE),
-    "frames only": {"frame": np.arange(len(T)) * 1.0} | RATE,
+    "frames only": {"frame": 200 * T} | RATE,
+    "ticks only": {"tick": 200 * T} | RATE,
     "an index only": {" ": np.arange(len(T)) * 1.0} | RATE,
     "two times": {"time_a (s)": T, "time_b (s)": LATE} | RATE,
     "two IMUs": TIME | block("gyro_1_* (rad/s)", "xyz", W) | block("gyro_2_* (rad/s)", "xyz", W + 0.01 * NOISE),

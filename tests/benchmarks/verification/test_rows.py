@@ -82,6 +82,7 @@ SEEN = {
     "an unknown sequence": ({f"euler_{axis}": T for axis in "xyz"}, "undecided"),
     "a frame that moves": ({f"q_lvlh_{part}": Q[:, i] for i, part in enumerate("wxyz")}, "undecided"),
     "a part of a quaternion": ({"q_x": Q[:, 1], "q_y": Q[:, 2], "q_z": Q[:, 3]}, "undecided"),
+    "a quaternion of any name": ({f"b{i}": Q[:, i] for i in range(4)}, "undecided"),
     "no attitude": ({"altitude": T, "quality": T, "gyro_temperature": T, "roll_command": T, "torque_x": T}, "right"),
 }
 
