@@ -15,13 +15,13 @@ from scipy.spatial.transform import Rotation
 from conservative.attitude import Array, angle_between, to_quaternion
 from conservative.scene import Scene
 
-from .compare import LINEAR, LONGEST, NUMERICAL, Compared, Effort, Solution, differ, exact, linearise
+from .compare import FLOOR, LINEAR, LONGEST, NUMERICAL, SIGMAS, Compared, Effort, Solution, differ, exact, linearise
 from .explanation import HALF, PROVEN, Explanation, Trial, attempt, explain
 from .find_steps import PARTS, STEPS_AT_MOST, Linearised, by_step, find_steps
 from .mistakes import BY_KEY
 from .mistakes.attitudes import DRIFTS, RULES, Drift, align, integrate
 from .mistakes.equations import EQUATIONS
-from .mistakes.habits import HABITS, ROWS, STANDSTILLS, Standstill
+from .mistakes.habits import HABITS, PART_STANDSTILLS, ROWS, STANDSTILLS, Standstill
 from .mistakes.mistake import Number
 from .mistakes.readings import ATTITUDES, AXES, RATES, READINGS, Reading
 from .mistakes.scenes import PARTS as SCENE_PARTS
@@ -148,7 +148,8 @@ def _separate(case: Compared, named: list[Explanation]) -> list[str]:
     """Return a note on the data that would separate several mistakes that explain a file."""
     motions = [explanation.made for explanation in named if explanation.made is not None]
     for kind, i, size, unit in (("attitudes", 0, 1.0, "rad"), ("rates", 1, case.scale, "of the largest rate")):
-        apart = max((float(np.abs(a[i] - b[i]).max()) / size for a, b in combinations(motions, 2)), default=0.0)
+        pairs = [(a[i], b[i]) for a, b in combinations(motions, 2) if len(a[i]) == len(b[i])]  # some begin after the first row
+        apart = max((float(np.abs(a - b).max()) / size for a, b in pairs), default=0.0)
         if case.data[i] is None and apart > 2 * case.allowed[i]:
             return [f"Columns of {kind} would separate these: they differ by up to {apart:.2g} {unit}."]
     return ["They make the same rows. A longer file or more digits may separate them."] * (len(named) > 1)
@@ -459,6 +460,8 @@ def _habits(case: Compared, asked: _Asked) -> Explanations:
     """Yield motions whose state is changed after each step, or that stand still."""
     for standstill in STANDSTILLS:
         yield _standstill(case, standstill)
+    for standstill in PART_STANDSTILLS:
+        yield _part_standstill(case, standstill)
     w = case.data[1]
     if w is None or len(case.scene.breaks) > MOST_BREAKS:
         return
@@ -510,23 +513,72 @@ def _rates_before(case: Compared) -> Array:
     return np.vstack([case.exact[1][:1], made])
 
 
+def _still_within(case: Compared) -> Array:
+    """Return the changes (2,) of attitudes, rad, and relative rates that a body that stands still has by its noise."""
+    return np.where(case.noise * SIGMAS > np.maximum(case.rounded, FLOOR), 2 * SIGMAS * case.noise, STILL)
+
+
+def _first_still(case: Compared, i: int) -> int:
+    """Return the first row from which attitudes (0) or rates (1) stand still, as in the last row."""
+    x = case.data[i]
+    assert x is not None
+    apart = np.abs(x - x[-1]).reshape(len(x), -1).max(axis=1) / (case.scale if i else 1.0)
+    going = np.flatnonzero(apart > _still_within(case)[i])
+    return int(going[-1]) + 1 if len(going) else 0
+
+
+def _until(case: Compared, k: int) -> Compared:
+    """Return the case whose initial state fits the rows before one of them, and is not fitted to the others."""
+    before = case.take(slice(0, k))
+    if not case.free or k < 4:
+        return case
+    return replace(case.at(before.fit(exact(before), np.zeros(0), np.zeros(0))[0]), free=())
+
+
+def _part_standstill(case: Compared, mistake: Standstill) -> Explanation | None:
+    """Return the explanation by attitudes or rates that stand still from a time on while the others go on."""
+    i = int(mistake.of or 0)
+    if case.data[0] is None or case.data[1] is None or case.step is not None:
+        return None
+    k, x = _first_still(case, i), case.data[i]
+    rest = i == 1 and bool(np.abs(x[k:]).max() <= _still_within(case)[1] * case.scale)
+    if len(case.t) - k < 3 or mistake.rest != (0.0 if rest else 1.0) or (case.error[i, k:] <= case.allowed[i]).all():
+        return None
+    case = _until(case, k)
+
+    def build(of: Compared) -> Solution | None:
+        motion, equations = exact(of), of.equations()
+
+        def frozen(R: Array, w: Array, p: Array, n: int) -> tuple[Array, Array]:
+            t = np.minimum(of.t[:n], np.clip(p[:, :1], of.start, None))
+            last = equations.flow(of.start, R, w, float(max(t.max(), of.start)) + 1e-9 * (of.t[-1] - of.start)).at_own_times(t)
+            going = motion(R, w, np.zeros((len(R), 0)), n)
+            rates = np.where((of.t[:n] > p[:, :1])[..., None], mistake.rest, 1.0) * last[1]
+            return (last[0], going[1]) if i == 0 else (going[0], rates)
+
+        return frozen
+
+    trial = Trial((mistake,), build, mistake.numbers, anew=lambda other: _part_standstill(other, mistake))
+    if k == 0 or rest:
+        stop = float(case.t[k])  # between two rows
+        known = {"time": stop}
+        explanation = attempt(case, _at_numbers(trial, (0.5 * (stop + case.t[k - 1]) if k else stop,)), known=known)
+        return None if explanation is None else replace(explanation, trial=trial, numbers=min(k, 1))
+    return attempt(case, trial, [float(case.t[k - 1] + case.t[k]) / 2])
+
+
 def _standstill(case: Compared, mistake: Standstill) -> Explanation | None:
     """Return the explanation by a body that stands still from a time on; None if the rows do not."""
     R, w = case.data
-    moved = np.zeros(len(case.t) - 1)
-    for x, scale in ((R, 1.0), (w, case.scale)):
-        if x is not None:
-            moved = np.maximum(moved, np.abs(np.diff(x, axis=0)).reshape(len(moved), -1).max(axis=1) / scale)
-    going = np.flatnonzero(moved > STILL)
-    k = int(going[-1]) + 1 if len(going) else 0
-    rest = w is None or bool(np.abs(w[k:]).max() <= STILL * case.scale)
+    k = max(_first_still(case, i) for i in range(2) if case.data[i] is not None)
+    rest = w is None or bool(np.abs(w[k:]).max() <= _still_within(case)[1] * case.scale)
     if len(case.t) - k < 3 or (w is not None and mistake.rest != (0.0 if rest else 1.0)) or (w is None and mistake.rest):
         return None
     start = _still(case)
     stays_at_start = R is not None and k == 0 and case.apart((np.broadcast_to(R[0], R.shape), start[1]), start)[0] <= STILL
     if mistake.from_start != stays_at_start or (R is None and not rest):
         return None
-    stop = float(case.t[k])
+    stop, case = float(case.t[k]), _until(case, k)
 
     def build(of: Compared) -> Solution | None:
         equations = of.equations()

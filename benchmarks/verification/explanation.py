@@ -134,7 +134,11 @@ class Explanation:
         intervals = 2 * case.deviations(motion, np.array([*[0.0] * 6, *values]), INTERVAL)[6:]
         if not np.isfinite(intervals).all():
             return self
-        measured = {number.name: Measured(x, d) for number, x, d in zip(trial.numbers, values, intervals.tolist(), strict=True)}
+        measured = {
+            number.name: Measured(x, d)
+            for number, x, d in zip(trial.numbers, values, intervals.tolist(), strict=True)
+            if d < max(1.0, abs(x))  # the rows do not determine the others
+        }
         known = self.values | measured
         return replace(self, values=known, sentence=self.sentence.replace(trial.sentence(self.values), trial.sentence(known)))
 
