@@ -26,7 +26,7 @@ from .habits import HABITS, OTHER_ROWS, PART_STANDSTILLS, ROWS, STANDSTILLS
 from .mistake import Mistake
 from .readings import READINGS
 from .samples import RESAMPLED
-from .scenes import BODIES, SCENES
+from .scenes import BODIES, DIGITS, SCENES
 from .steps import INTEGRATORS
 from .times import ROW_TIMES, TIMES
 
@@ -42,7 +42,7 @@ def table_of(mistakes: Iterable[Mistake]) -> Mapping[str, Mistake]:
 
 
 BY_KEY = table_of([
-    *READINGS, *TIMES, *ROW_TIMES, *SCENES, *BODIES, *EQUATIONS, *INTEGRATORS, *RULES, *DRIFTS,
+    *READINGS, *TIMES, *ROW_TIMES, *SCENES, DIGITS, *BODIES, *EQUATIONS, *INTEGRATORS, *RULES, *DRIFTS,
     *HABITS, *STANDSTILLS, *PART_STANDSTILLS, *ROWS, *OTHER_ROWS, *RESAMPLED, *FITTED,
     *(mistake for mistake in LOADED if mistake.key not in {scene_mistake.key for scene_mistake in SCENES}),
 ])  # fmt: skip
