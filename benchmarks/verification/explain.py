@@ -13,6 +13,7 @@ from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
 from conservative.attitude import Array, angle_between, to_quaternion
+from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 
 from .compare import FLOOR, LINEAR, LONGEST, NUMERICAL, SIGMAS, Compared, Effort, Solution, differ, exact, linearise
@@ -687,7 +688,8 @@ def _turned_axes(case: Compared, asked: _Asked) -> Explanations:
     if len(case.scene.breaks) > MOST_BREAKS:
         return
     if case.data[0] is not None and not (case.from_row and case.scene.free):  # it moves equally in any axes of the world
-        yield _best_turn(case, compose(BY_KEY["turned world"]))
+        best = _best_turn(case, compose(BY_KEY["turned world"]))
+        yield best and _about_vertical(case, best)
     yield _best_turn(case, compose(BY_KEY["body axes"]))
 
 
@@ -704,6 +706,16 @@ def _best_turn(case: Compared, trial: Trial) -> Explanation | None:
         key=lambda explanation: (round(explanation.share, 3), np.linalg.norm([*explanation.values.values()])),
         default=None,
     )
+
+
+def _about_vertical(case: Compared, explanation: Explanation) -> Explanation:
+    """Return a turn of the world without the turn about the vertical that gravity does not show."""
+    if not isinstance(case.scene.potential, UniformGravity) or case.scene.loads or case.scene.torque is not None:
+        return explanation
+    A = Rotation.from_rotvec([*explanation.values.values()]).as_matrix().T
+    about = Rotation.from_rotvec([0.0, 0.0, np.arctan2(A[0, 1] - A[1, 0], A[0, 0] + A[1, 1])]).as_matrix()
+    turn = Rotation.from_matrix((A @ about).T).as_rotvec().tolist()
+    return _shortest_turn(replace(explanation, values=dict(zip(explanation.values, turn, strict=True))))
 
 
 def _shortest_turn(explanation: Explanation) -> Explanation:

@@ -44,7 +44,9 @@ class Measured(float):
         """Return the number with as many digits as its interval has, and the interval."""
         if not self.interval > EXACT * max(abs(self), 1e-3):
             return format(0.0 if abs(self) <= self.interval else float(self), spec)
-        digits = math.floor(math.log10(abs(self) or self.interval)) - math.floor(math.log10(self.interval)) + 1
+        if abs(self) < 0.1 * self.interval:
+            return f"0 ± {self.interval:.1g}"
+        digits = math.floor(math.log10(abs(self))) - math.floor(math.log10(self.interval)) + 1
         sign = "+" if spec.startswith("+") else ""
         return f"{float(self):{sign}.{max(1, digits)}g} ± {self.interval:.1g}"
 
