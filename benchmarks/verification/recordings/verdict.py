@@ -311,10 +311,16 @@ def _reason(finding: Finding, details: Details, proven: Sequence[Explanation]) -
 
 
 def _single_rows(comparison: Comparison) -> Explanation:
-    row, at, size = comparison.outliers[0]
-    values = {"row": float(row), "time": at, "error": size}
-    mistake, before = BY_KEY["single rows"], comparison.worst.max(axis=1).tolist()
-    return Explanation((mistake.key,), mistake.sentence.format(**values), values, [0.0, 0.0], before, 0.0, 0.0, True)
+    """Return the explanation by single rows that are off, or by spoiled rates where quaternions change their sign."""
+    (row, at, size), case = comparison.outliers[0], comparison.case
+    key, values = "single rows", {"row": float(row), "time": at, "error": size}
+    flips = case.t[case.flipped] if case.flipped is not None else np.zeros(0)
+    near = 1.5 * float(np.median(np.diff(case.t)))  # the row of the change, or a neighbour
+    times = [time for _, time, _ in comparison.outliers]
+    if len(times) > 1 and len(flips) and all(np.abs(flips - time).min() < near for time in times):
+        key, values = "rates at sign changes", {"rows": float(len(times)), "first": float(row)}
+    mistake, before = BY_KEY[key], comparison.worst.max(axis=1).tolist()
+    return Explanation((key,), mistake.sentence.format(**values), values, [0.0, 0.0], before, 0.0, 0.0, True)
 
 
 def _doubt(case: Compared, errors: Array, resolved: Array, recording: Recording) -> str:
