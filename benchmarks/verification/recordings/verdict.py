@@ -26,6 +26,7 @@ from .comparison import MOST_NOISE, Comparison, compare, prepare
 from .describe import Description, at_rest, only_noise, unseen
 from .rows import OUTSIDE, REPEATED
 from .table import Recording
+from .windows import find_stretch
 
 ACCURATE, ACCURATE_SINGLE = 1e-6, 1e-4
 """Errors that a good solver may leave, in double and in single precision."""
@@ -215,6 +216,10 @@ def verify_recording(
         doubt = HIDDEN if hidden else _doubt(comparison.case, comparison.errors, rows.resolved, recording)
     verdict = Verdict.UNDECIDED if doubt else verdict
     case = comparison.case
+    if verdict is Verdict.WRONG and not proven and from_row and shaped and not comparison.outliers:
+        tell("free motion")
+        if (made := _thrown(scene, recording, case, error, name)) is not None:
+            return made
     # With noise, the fit shows how well the recording determines the moments.
     if (
         verdict is Verdict.RIGHT
@@ -277,6 +282,25 @@ def verify_recording(
     )
     notes += [*_instability(comparison), *(note for note in recording.layout.notes if note != "unit")]
     return Verification(name, "recording", [finding], _reason(finding, details, proven), notes, details)
+
+
+def _thrown(scene: Scene, recording: Recording, case: Compared, error: float | None, name: str) -> Verification | None:
+    """Return the verification of the rows of free motion in a recording of a throw; None if it is none, or these are wrong."""
+    stretch = find_stretch(case)
+    part = None if stretch is None else recording.between(stretch.first, stretch.last)
+    if stretch is None or part is None:
+        return None
+    made = verify_recording(scene, part, error=error, name=name)
+    if made.verdict is not Verdict.RIGHT:
+        return None
+    first, last = part.number(0), part.number(len(part.t) - 1)
+    rows = f"rows {first:,} to {last:,} ({part.t[0]:.6g} to {part.t[-1]:.6g} s) are free motion"
+    if not stretch.open:
+        return replace(made, reason=f"{rows}; the other rows are not, and are not compared; {made.reason}")
+    start, end = part.options.start_time, part.options.end_time
+    doubt = f"{rows[:1].upper()}{rows[1:]}, and {stretch.open}. --from {start!r} --until {end!r} compares these rows alone"
+    findings = [replace(finding, verdict=Verdict.UNDECIDED, detail=doubt) for finding in made.findings]
+    return replace(made, findings=findings, reason=f"{doubt}; {made.reason}")
 
 
 def _pair(values: Array) -> tuple[float, float]:
