@@ -35,6 +35,8 @@ SHAPE = 1e-6
 UNITS = "rad", "of the largest rate"
 FAR = 0.05
 """Error, rad or relative to the largest rate, above which a motion is a different one."""
+NOT_FREE = "that are not free motion"
+"""Reason to leave a row of a throw out."""
 HIDDEN = (
     "The motion multiplies the digits or the noise of the first row to the size of the error. More digits, a shorter file "
     "(--until), or --start scene decide"
@@ -109,6 +111,8 @@ class Details:
         All mistakes that were tried, best first.
     quantities
         Errors and drifts.
+    stretch
+        First and last row of the free motion in a recording of a throw; None if all rows are compared.
     times, series
         Times (n,), s, and values (n,) of each quantity at them.
     """
@@ -131,6 +135,7 @@ class Details:
     candidates: Sequence[Explanation]
     tried: Sequence[Explanation]
     quantities: Sequence[Quantity]
+    stretch: tuple[int, int] | None
     times: Array = field(repr=False)
     series: Mapping[str, Array] = field(repr=False)
 
@@ -263,6 +268,7 @@ def verify_recording(
             Quantity(quantity, float(x.max()), float(x[-1]), limits[i] if i < len(limits) else math.nan)
             for i, (quantity, x) in enumerate(series.items())
         ],
+        stretch=None,
         times=comparison.case.t[: len(comparison.errors[0])] + comparison.shift,
         series=series,
     )
@@ -294,6 +300,10 @@ def _thrown(scene: Scene, recording: Recording, case: Compared, error: float | N
     if made.verdict is not Verdict.RIGHT:
         return None
     first, last = part.number(0), part.number(len(part.t) - 1)
+    assert isinstance(made.details, Details)
+    left_out = {NOT_FREE if reason == OUTSIDE else reason: count for reason, count in part.left_out.items()}
+    details = replace(made.details, stretch=(first, last), description=replace(made.details.description, left_out=left_out))
+    made = replace(made, details=details)
     rows = f"rows {first:,} to {last:,} ({part.t[0]:.6g} to {part.t[-1]:.6g} s) are free motion"
     if not stretch.open:
         return replace(made, reason=f"{rows}; the other rows are not, and are not compared; {made.reason}")
@@ -315,7 +325,8 @@ def _reason(finding: Finding, details: Details, proven: Sequence[Explanation]) -
     """Return the reason of the verdict: the errors, the allowed errors, and the mistakes with the errors that they leave."""
     allowed = details.show(details.allowed)
     verb = "are" if all(unit.size for unit in details.units) else "is"
-    left = sum(count for reason, count in details.description.left_out.items() if reason not in (OUTSIDE, REPEATED))
+    no_gap = OUTSIDE, REPEATED, NOT_FREE
+    left = sum(count for reason, count in details.description.left_out.items() if reason not in no_gap)
     decided = [
         f"its largest error is {details.show(details.error)}",
         f"{allowed} {verb} allowed by {'--error' if finding.by == 'error' else f'its {finding.by}'}",

@@ -72,17 +72,17 @@ def find_stretch(case: Compared) -> Stretch | None:
     # The hand adds to the noise of the sensor, so the first guess is the smallest noise of any part.
     parts = [slice(k, k + FEWEST) for k in range(0, len(t) - FEWEST + 1, FEWEST // 2)]
     noise = NEARLY * min(float(estimate_noise(t[some], (None, w[some]))[0][1]) for some in parts)
-    first = last = 0
+    first, last, turns = 0, 0, np.linalg.norm(w, axis=1) * np.gradient(t)
     free = np.zeros(len(t), bool)
     for _ in range(3):
         free = _free(constant, noise, mean)
-        first, last = _longest(free, np.linalg.norm(w, axis=1) * np.gradient(t))
+        first, last = _longest(free, turns)
         if last - first < FEWEST:
             return None
         noise = float(estimate_noise(t[first:last], (None, w[first:last]))[0][1])
     if noise <= 1e-6 * case.scale:  # no noise of a sensor
         return None
-    return _refine(case, first, last, noise, ~free, mean)
+    return _refine(case, first, last, noise, ~free, turns, mean)
 
 
 def _free(constant: Array, noise: float, mean: int) -> Array:
@@ -104,7 +104,7 @@ def _longest(free: Array, turns: Array) -> tuple[int, int]:
     return max(runs, key=lambda run: sums[run[1]] - sums[run[0]], default=(0, 0))
 
 
-def _refine(case: Compared, first: int, last: int, noise: float, forced: Array, mean: int) -> Stretch | None:
+def _refine(case: Compared, first: int, last: int, noise: float, forced: Array, turns: Array, mean: int) -> Stretch | None:
     """Return the stretch around rows without a torque whose rows are explained by one start, and whether it decides."""
     n, relative = len(case.t), noise / case.scale
     own = allow((0.0, 0.0), (float(case.noise[0]), relative))
@@ -144,10 +144,20 @@ def _refine(case: Compared, first: int, last: int, noise: float, forced: Array, 
     if not passed or whole.turned < LEAST_TURN or b - a < FEWEST:
         return None
     first, last = a, b
+    others = np.concatenate([forced[:first], np.ones(last - first, bool), forced[last:]])
+    k, m = _longest(~others, turns)
+    several = m - k >= FEWEST and turns[k:m].sum() >= LEAST_TURN
+    if first < MEAN or (several and n - last < MEAN):
+        return None  # a program begins with its motion; a kick makes two stretches
     reason = _open(whole)
-    if reason == "" and not (hand_before and hand_after):
-        where = "before" if hand_after else "after" if hand_before else "before and after"
-        reason = f"the body is at rest {where} them, or the file has no rows there"
+    if reason == "":
+        sides_at_rest = " and ".join(name for name, hand in (("before", hand_before), ("after", hand_after)) if not hand)
+        if several:
+            reason = "other rows may be free motion, too"
+        elif n - last < MEAN:
+            reason = "the file has no rows of another motion after them"
+        elif sides_at_rest:
+            reason = f"the body is at rest {sides_at_rest} them"
     return None if reason is None else Stretch(first, last - 1, reason)
 
 
