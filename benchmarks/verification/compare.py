@@ -48,10 +48,21 @@ HOPELESS = 30.0
 """Error, in units of the noise, from which no other first row explains it."""
 LINEAR = 0.3
 """Largest difference of motions, rad, that is treated to first order."""
+FEWEST_LINEAR, MOST_LEFT, HIDDEN_BY_NOISE = 8, 0.7, 3.0
+"""Rows from which `may_explain` decides, the share of the difference that a possible mistake leaves, and the root of the mean
+square, in units of the noise, below which it does not decide."""
+ROWS_OF_EFFORT = 500
+"""Number of rows whose comparison takes as long as a stretch of a motion."""
 PERTURBED = 1e-8, 1e-12
 """Changes of initial states that show how the motion multiplies them. The second is used where the first becomes large."""
 STRAIGHT, NARROWED = 0.03, 6
 """Largest difference of motions from which slopes are computed, and the number of trials with smaller changes."""
+MOST_NOISE = 0.05
+"""Largest noise, rad or relative to the largest rate. Larger differences of rows are motion."""
+MOSTLY_ALONG = 0.9
+"""Median cosine between differences and the motion from which they are errors of times; 0.5 for noise."""
+CONVERGED = 1e-3
+"""Share of the sum of squares by which a step of a fit that has converged improves it."""
 SMALLEST_CHANGE = 1e-14
 """Smallest change of initial states from which slopes are computed."""
 EXTENDED = 40
@@ -99,10 +110,11 @@ def take_rows(data: States, rows: Any) -> States:
 
 def weigh(scene: Scene) -> float:
     """Return the work of a solution in a scene, relative to the work for a free body."""
-    weight = 1.0 + 2.0 * (scene.potential is not None) + 3.0 * bool(scene.features & IN_TIME)
     varying = None if scene.damping is None else scene.damping.of_time
     slow = (scene.torque is not None and scene.torque.of_attitude) or (varying is not None and varying.of_attitude)
-    return weight + 1.0 * bool(scene.loads) + 6.0 * slow  # functions of attitude are called for each state
+    in_python = scene.potential is not None and Equations(scene).law is None
+    weight = 1.0 + 0.5 * bool(scene.features & IN_TIME) + 2.0 * bool(scene.loads)
+    return weight + 40.0 * (slow or in_python)  # functions of attitude are called for each state in each iteration
 
 
 def take_part(motion: tuple[Array, Array], of: States) -> States:
@@ -115,7 +127,7 @@ def take_part(motion: tuple[Array, Array], of: States) -> States:
 class Effort:
     """The work that a search may still do. It is counted, because the clock depends on how busy the machine is.
 
-    The unit is a stretch of a solution (`Equations.flow`), one to three milliseconds on an idle machine.
+    The unit is a stretch of a solution (`Equations.flow`), 0.3 ms on an idle machine.
     """
 
     left: float
@@ -139,7 +151,8 @@ class Compared:
     the factor by which the motion multiplies an error of the first row, and every `stride`-th row is here. `effort` is
     the work that a search may still do. `rounded` are the errors that digits make; with an allowed error of the user, which
     alone decides, this one. `step` is the step of a program, s; None if it is not known. `flipped` (n,) is True in rows in
-    which the quaternion of the file changes its sign; None if the file has no quaternions.
+    which the quaternion of the file changes its sign; None if the file has no quaternions. `open` says for attitudes and rates
+    whether the rows do not show their noise: what a motion leaves there may be noise.
     """
 
     scene: Scene
@@ -156,6 +169,7 @@ class Compared:
     rounded: tuple[float, float] = (0.0, 0.0)
     step: float | None = None
     flipped: Any = None
+    open: tuple[bool, bool] = (False, False)
 
     @property
     def from_row(self) -> bool:
@@ -215,6 +229,48 @@ class Compared:
                 return some
         return None
 
+    @cached_property
+    def departure(self) -> tuple[Array, Array]:
+        """The first rows minus the exact motion, (n, 6), and the matrices (n, 6, 6) that carry changes of its start there.
+
+        Differences are of first order in these rows. With a start that is exact there are no matrices, (n, 6, 0).
+        """
+        R, w = (x if y is None else y for x, y in zip(self.exact, self.data, strict=True))  # no difference without data
+        away = differ(*self.exact, R, w, self.scale)
+        n = count_linear(away)
+        flow = linearise(self.take(slice(0, n)))[2][:, :, list(self.free)] if self.free else np.zeros((n, 6, 0))
+        return away[:n], flow
+
+    def may_explain(self, motion: Solution, numbers: Array, small: Array) -> bool:
+        """Return whether a motion can explain the error of the first rows to first order, with its numbers and start fitted.
+
+        It decides in one evaluation what a fit would find after many. It cannot decide, and returns True, where the motion
+        begins far from the rows or where noise hides the difference.
+        """
+        away, flow = self.departure
+        n = len(away)
+        if n < min(FEWEST_LINEAR, len(self.t)):
+            return True
+        some = self.take(slice(0, n))
+        moved = np.vstack([numbers, numbers + np.diag(small)]) if len(numbers) else numbers[None]
+        R, w = some.evaluate(motion, np.hstack([np.zeros((len(moved), 6)), moved]))
+        made = differ(some.exact[0], some.exact[1], R, w, self.scale)
+        n = min(n, count_linear(made[0]))
+        if n < min(FEWEST_LINEAR, len(self.t)) or not np.isfinite(w[:, :n]).all():
+            return True
+        weights = np.repeat([float(x is not None) for x in self.data] / self.noise, 3)
+        wanted = ((away[:n] - made[0, :n]) * weights).ravel()
+        columns = [((flow[:n, :, k]) * weights).ravel() for k in range(flow.shape[2])]
+        columns += [((x[:n] - made[0, :n]) / size * weights).ravel() for x, size in zip(made[1:], small, strict=True)]
+        plain = (away[:n] * weights).ravel()
+        if columns:
+            matrix = np.stack(columns, axis=1)
+            wanted = wanted - matrix @ np.linalg.lstsq(matrix, wanted, rcond=None)[0]
+            starts = matrix[:, : flow.shape[2]]
+            plain = plain - starts @ np.linalg.lstsq(starts, plain, rcond=None)[0]
+        left, size = np.linalg.norm(wanted), np.linalg.norm(plain)
+        return bool(left < MOST_LEFT * size or left < HIDDEN_BY_NOISE * np.sqrt(6 * n))
+
     @property
     def turned(self) -> float:
         """The angle, rad, by which the body may have turned."""
@@ -265,6 +321,15 @@ class Compared:
         most = np.where(noisy, 1.3 * np.sqrt(3) * (1 + 3 / np.sqrt(n)) * self.noise, self.allowed)
         return bool((error.max(axis=1) <= self.allowed).all() and (mean <= most).all())
 
+    def leaves_noise(self, R: Array, w: Array) -> Array:
+        """Return for attitudes and rates (2,) whether their noise is open, and a motion leaves differences that are noise."""
+        a, b = (y if x is None else x for x, y in zip(self.data, (R, w), strict=True))
+        left, moved = differ(R, w, a, b, self.scale), np.gradient(w, self.t, axis=0) if len(self.t) > 1 else 0 * w
+        return np.array([
+            open_ and x is not None and is_noise(left[:, part], along)
+            for open_, x, part, along in zip(self.open, self.data, (slice(3), slice(3, 6)), (w, moved), strict=True)
+        ])  # fmt: skip
+
     def size(self, error: Array) -> float:
         """Return the root of the mean square of errors, in units of the noise."""
         return float(np.sqrt((error**2).mean(axis=1) / self.noise**2).max())
@@ -272,7 +337,9 @@ class Compared:
     def evaluate(self, motion: Solution, many: Array) -> tuple[Array, Array]:
         """Return motions (B, n, 3, 3), (B, n, 3) of changes of the initial state and other numbers, (B, 6 + k)."""
         turns = Rotation.from_rotvec(many[:, :3]).as_matrix()
-        self.effort.spend(weigh(self.scene) * (1 + self.turned / ANGLE + len(self.scene.breaks)) * (1 + len(many) / 16))
+        corners = int(np.searchsorted(self.scene.breaks, self.t[-1])) if len(self.scene.breaks) else 0
+        stretches, bodies = 1 + self.turned / ANGLE + corners, len(many)
+        self.effort.spend(weigh(self.scene) * stretches * (1 + bodies) / 2 + bodies * len(self.t) / ROWS_OF_EFFORT)
         return motion(self.scene.R_WB0 @ turns, self.scene.w_WB_B0 + many[:, 3:6] * self.scale, many[:, 6:], len(self.t))
 
     def equations(self, scene: Scene | None = None, gyroscopic: float = 1.0, **changes: Any) -> Equations:
@@ -292,7 +359,7 @@ class Compared:
         R, w = self.evaluate(motion, numbers + small * np.vstack([0 * numbers, np.eye(len(numbers))[moved]]))
         d = (self.differences(R, w) / np.repeat(self.noise, [9, 3])).reshape(1 + len(moved), -1)
         slopes, out = (d[1:] - d[0]) / small, np.zeros(len(numbers))
-        out[moved] = np.sqrt(np.diag(np.linalg.pinv(slopes @ slopes.T)))
+        out[moved] = np.sqrt(np.maximum(np.diag(np.linalg.pinv(slopes @ slopes.T)), 0.0))
         return out
 
     def fit(self, motion: Solution, extra: Array, changed: Array, most: int = 8) -> tuple[Array, Array, tuple[Array, Array]]:
@@ -356,7 +423,9 @@ class Compared:
                 break
             gain = 1 - (new @ new) / (now @ now)
             p, now = q, new
-            if gain < 1e-3 or np.sqrt(now @ now / len(now)) < 1e-3:  # converged, or far below the noise
+            if gain < CONVERGED or np.sqrt(now @ now / len(now)) < 1e-3:  # converged, or far below the noise
+                break
+            if damping < 1e-6 and ((axes.T @ now) ** 2).sum() < CONVERGED * (now @ now):  # no step along these slopes helps
                 break
         return p, float(now @ now)
 
@@ -439,6 +508,12 @@ def differ(R0: Array, w0: Array, R: Array, w: Array, scale: float) -> Array:
     return np.concatenate([vector, np.nan_to_num(w - w0) / scale], axis=-1)
 
 
+def count_linear(differences: Array) -> int:
+    """Return the number of first rows whose differences (n, 6) are of first order."""
+    far = np.linalg.norm(differences, axis=1) > LINEAR
+    return int(np.argmax(far)) if far.any() else len(far)
+
+
 def linearise(case: Compared) -> tuple[Array, Array, Array]:
     """Return the exact motion (n, 3, 3), (n, 3), and the matrices (n, 6, 6) that carry small changes of its start along."""
     flows = []
@@ -466,11 +541,47 @@ def exact(case: Compared) -> Solution:
     return motion
 
 
-def estimate_noise(t: Array, data: States) -> tuple[Array, Array]:
+def is_noise(left: Array, along: Array) -> bool:
+    """Return whether differences (n, 3) from a motion are noise: small, white, of one size at all times and in all directions.
+
+    `along` (n, 3) is the direction in which errors of times lie.
+    """
+    n = len(left)
+    if n < FEWEST_FOR_NOISE or not np.isfinite(left).all():
+        return False
+    power = float((left * left).sum())
+    size = math.sqrt(power / (3 * n))
+    if not 0 < size <= MOST_NOISE or np.abs(left).max() > SIGMAS * size:
+        return False
+    off = float(np.linalg.norm(left.mean(axis=0))) / size
+    lags = [abs(float((left[k:] * left[:-k]).sum())) / power for k in range(1, min(20, n // 4) + 1)]
+    halves = sorted(float((part * part).sum()) for part in (left[: n // 2], left[-(n // 2) :]))
+    spread = np.linalg.eigvalsh(left.T @ left)
+    return bool(
+        off < 5 / math.sqrt(n)
+        and max(lags) < max(0.25, 4 / math.sqrt(3 * n))
+        and halves[1] < (2 + 12 / math.sqrt(n)) * halves[0]
+        and spread[0] > 0.05 * spread[-1]
+        and not lies_along(left, along)
+    )
+
+
+def lies_along(left: Array, along: Array) -> bool:
+    """Return whether most differences (n, 3) lie along directions (n, 3). A third of them does by chance."""
+    sizes = np.linalg.norm(left, axis=1) * np.linalg.norm(along, axis=1)
+    some = sizes > 0
+    if np.linalg.matrix_rank(left, tol=1e-9 * (np.abs(left).max() or 1.0)) < 2 or some.sum() < len(left) / 2:
+        return False  # differences in one direction show nothing
+    cosines = np.abs((left * along).sum(axis=1))[some] / sizes[some]
+    return bool(np.median(cosines) > MOSTLY_ALONG)
+
+
+def estimate_noise(t: Array, data: States, along: States = (None, None)) -> tuple[Array, Array]:
     """Return the noise (2,) of attitudes, rad, and rates, rad/s, of one axis, and whether the rows are close enough to tell.
 
     It is the smallest robust estimate from differences of order 3 to 9. Differences of a smooth motion fall with each order,
-    and differences of noise do not.
+    and differences of noise do not. Differences along the motion are of times, and no noise: `along` are directions (n, 3) of
+    the motion, by default of the data.
     """
     noise, resolved = np.zeros(2), np.zeros(2, bool)
     for i, (values, size) in enumerate(zip(data, (2.0, 1.0), strict=True)):
@@ -490,5 +601,16 @@ def estimate_noise(t: Array, data: States) -> tuple[Array, Array]:
             # 1.538: the median norm of three normal numbers.
             estimates.append(size * float(np.median(np.linalg.norm(d, axis=1))) / 1.538)
         noise[i] = min(estimates)
-        resolved[i] = estimates[-1] > 0.5 * estimates[-3] or noise[i] < TINY
+        # Held rows and stamps that are off change the rows along the motion, and noise in all directions.
+        middle, direction = slice(4, 4 + len(d)), along[i]
+        forward = x[5 : 5 + len(d)] - x[3 : 3 + len(d)] if direction is None else direction[middle]
+        if i == 0:
+            d, forward = _turn_of(x[middle], d), _turn_of(x[middle], forward) if direction is None else forward
+        resolved[i] = (estimates[-1] > 0.5 * estimates[-3] and not lies_along(d, forward)) or noise[i] < TINY
     return noise, resolved
+
+
+def _turn_of(q: Array, change: Array) -> Array:
+    """Return the small turns (n, 3) in body axes, up to their size, of changes (n, 4) of quaternions."""
+    a, v, b, u = q[:, :1], q[:, 1:], change[:, :1], change[:, 1:]
+    return a * u - b * v - np.cross(v, u)

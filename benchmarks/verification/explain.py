@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from itertools import chain, combinations, product
@@ -12,28 +12,30 @@ import numpy as np
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from conservative.attitude import Array, to_quaternion
+from conservative.attitude import Array, angle_between, to_quaternion
+from conservative.scene import Scene
 
-from .compare import LINEAR, LONGEST, NUMERICAL, Compared, Effort, Solution, exact
+from .compare import LINEAR, LONGEST, NUMERICAL, Compared, Effort, Solution, differ, exact, linearise
 from .explanation import HALF, PROVEN, Explanation, Trial, attempt, explain
-from .find_steps import PARTS, STEPS_AT_MOST, find_steps
+from .find_steps import PARTS, STEPS_AT_MOST, Linearised, by_step, find_steps
 from .mistakes import BY_KEY
-from .mistakes.attitudes import RULES, align, integrate
+from .mistakes.attitudes import DRIFTS, RULES, Drift, align, integrate
 from .mistakes.equations import EQUATIONS
 from .mistakes.habits import HABITS, ROWS, STANDSTILLS, Standstill
 from .mistakes.mistake import Number
 from .mistakes.readings import ATTITUDES, AXES, RATES, READINGS, Reading
 from .mistakes.scenes import PARTS as SCENE_PARTS
-from .mistakes.scenes import SCENES, SceneMistake, with_inertia
+from .mistakes.scenes import SCENES, SIZES, SceneMistake, with_inertia
 from .mistakes.steps import INTEGRATORS
 from .mistakes.times import DROPPED, JITTERED, TIMES
-from .solution import Equations, has_closed_form, truth
-from .trials import by_habit, by_rule, compose, fits, remark_on_damping
+from .resampled import find_resampled
+from .solution import Equations, has_closed_form, integrate_rates, truth
+from .trials import Drifting, by_drift, by_habit, by_rule, compose, fits, remark_on_damping
 
 FEWEST, MOST = 100, 2500
 """Rows that are explained: at least `FEWEST`, if the file has them, and at most `MOST`, evenly chosen."""
-EFFORT = 6_000
-"""Work of a search with a `share` of 1, in stretches (`Effort`): about 20 s of an idle core."""
+EFFORT = 20_000
+"""Work of a search with a `share` of 1, in stretches (`Effort`): about 5 s of an idle core."""
 MOST_BREAKS = 50
 """Largest number of jumps and corners of the loads with which numbers are fitted."""
 STILL = 1e-9
@@ -44,6 +46,11 @@ SHRUNK = 1e-3
 """A motion in other units of time that moves by less than this share of the exact motion stands still."""
 SHOWN = 10.0
 """A motion in other units of time that moves by less than this number of allowed errors shows nothing."""
+NEARLY, SMALL_SHARE, REFINED = 1e-2, 1e-6, 2
+"""Largest share of the error that an integrator leaves if sizes of numbers of the scene are fitted to the rest, the change of a
+number for slopes, and the number of such fits."""
+DRIFTING_ROWS, DRIFTING_EFFORT, MOST_FITS = 300, 30, 20
+"""Rows from which a drift is fitted, the work of a fit, and the largest number of its iterations."""
 FROZEN = "frozen motion"
 """Key of a mistake that no fitted number explains better."""
 _INERTIA = [f"inertia_{ij}" for ij in (11, 12, 13, 22, 23, 33)]
@@ -122,6 +129,8 @@ def diagnose(
     fewest = min((explanation.numbers, len(explanation.keys)) for explanation in good)
     good = [explanation for explanation in good if (explanation.numbers, len(explanation.keys)) == fewest]
     named = [explanation for explanation in good if _normalised(explanation)] or good
+    if case.step is None:
+        named = [explanation.with_intervals(case) for explanation in named]
     return Diagnosis(named, tried, _separate(case, named))
 
 
@@ -144,7 +153,8 @@ def _separate(case: Compared, named: list[Explanation]) -> list[str]:
     """Return a note on the data that would separate several mistakes that explain a file."""
     motions = [explanation.made for explanation in named if explanation.made is not None]
     for kind, i, size, unit in (("attitudes", 0, 1.0, "rad"), ("rates", 1, case.scale, "of the largest rate")):
-        apart = max((float(np.abs(a[i] - b[i]).max()) / size for a, b in combinations(motions, 2)), default=0.0)
+        pairs = ((a[i], b[i]) for a, b in combinations(motions, 2) if len(a[i]) == len(b[i]))
+        apart = max((float(np.abs(a - b).max()) / size for a, b in pairs), default=0.0)
         if case.data[i] is None and apart > 2 * case.allowed[i]:
             return [f"Columns of {kind} would separate these: they differ by up to {apart:.2g} {unit}."]
     return ["They make the same rows. A longer file or more digits may separate them."] * (len(named) > 1)
@@ -240,15 +250,23 @@ def _numbers(case: Compared, asked: _Asked) -> Explanations:
 
 def _within_digits(case: Compared, explanation: Explanation) -> Explanation:
     """Return an explanation, with a remark if the number differs from the scene's by less than the digits of the scene."""
-    if explanation.keys != ("rate of the orbit",):
+    mistake = BY_KEY[explanation.keys[0]]
+    if "factor" not in explanation.values or not isinstance(mistake, SceneMistake):
         return explanation
-    rate = float(case.scene.potential.orbit.rate)  # type: ignore[union-attr]
+    remark = _digits_of(case.scene, mistake, explanation.values["factor"])
+    return replace(explanation, sentence=explanation.sentence + remark)
+
+
+def _digits_of(scene: Scene, mistake: SceneMistake, factor: float) -> str:
+    """Return the end of a sentence on a number that differs from the scene's by less than the digits of the scene; or ""."""
+    if mistake.key != "rate of the orbit":
+        return ""
+    rate = float(scene.potential.orbit.rate)  # type: ignore[union-attr]
     written = Decimal(f"{rate:.17g}" if len(repr(rate)) > 18 else repr(rate))
     digits = len(written.normalize().as_tuple().digits)
     # Half a unit of the last digit, and a little more for rounding.
-    if abs(explanation.values["factor"] - 1) > 0.51 * 10.0 ** (np.ceil(np.log10(rate)) - digits) / rate:
-        return explanation
-    return replace(explanation, sentence=explanation.sentence + ", which is within the digits of the scene file")
+    within = abs(factor - 1) <= 0.51 * 10.0 ** (np.ceil(np.log10(rate)) - digits) / rate
+    return ", which is within the digits of the scene file" * bool(within)
 
 
 def _units(case: Compared, asked: _Asked) -> Explanations:
@@ -353,12 +371,11 @@ def _attitudes(case: Compared, asked: _Asked) -> Explanations:
             for rule in RULES:
                 yield attempt(case, by_rule(rule, 1), known={"step": case.step})
         return
-    alone = replace(case, data=(None, w), free=case.free[3:])
-    if alone.free:  # the integral collects what the first row is off
-        case = replace(case, scene=alone.at(alone.fit(exact(alone), np.zeros(0), np.zeros(0))[0]).scene)
+    case = _at_fitted_rates(case)
     made = case.exact
     if case.errors(*made)[1].max() > case.allowed[1] or not case.from_row:
         return
+    limits = {False: made[0], True: _on_the_wrong_side(case)}  # of short steps
     for rule in RULES:
         wanted, seen, explanations = [case.stride, 1], set[int](), list[Explanation]()
         while wanted and len(seen) < 8:  # each try is nearer to the best number of steps, so a few are enough
@@ -370,11 +387,12 @@ def _attitudes(case: Compared, asked: _Asked) -> Explanations:
             fine = np.append((case.t[:-1, None] + np.diff(case.t)[:, None] * np.arange(parts) / parts).ravel(), case.t[-1])
             rates = truth(case.scene, case.start, fine)[1] if parts > 1 else made[1]
             turned = integrate(rule.matrices, case.scene.R_WB0, rates, np.diff(fine), parts)
-            error, gone = turned - made[0], R - made[0]
+            error, gone = turned - limits[rule.world], R - limits[rule.world]
             small = np.linalg.norm(gone, axis=(1, 2)) < LINEAR
             ratio = float((error * gone)[small].sum() / ((error * error)[small].sum() or 1.0)) if small.sum() > 2 else 1.0
             if case.free:  # the first attitude has noise too
-                turned = align(turned, R, rule.world)
+                aligned = align(turned, R, rule.world)
+                turned = aligned if angle_between(aligned[0], turned[0]) <= case.allowed[0] else turned
             step = float(np.median(np.diff(case.t))) / parts
             explanations.append(explain(case, by_rule(rule, parts), (turned, made[1]), {"step": step}))
             if explanations[-1].explains:
@@ -382,6 +400,76 @@ def _attitudes(case: Compared, asked: _Asked) -> Explanations:
             if ratio > 0:
                 wanted += [max(1, round(parts * ratio ** (-1 / order))) for order in (1, 2)]
         yield min(explanations, key=lambda explanation: explanation.share)
+
+
+def _on_the_wrong_side(case: Compared) -> Array:
+    """Return the attitudes (n, 3, 3) whose quaternions are q' = w q / 2 with the exact rates, in body axes."""
+    start, end = case.scene.R_WB0, float(case.t[-1])
+    flow = Equations(case.scene).flow(case.start, start[None], case.scene.w_WB_B0[None], end)
+    # The conjugate obeys p' = p (-w) / 2.
+    turned = integrate_rates(lambda t: -flow.at(t.ravel())[1].reshape(*t.shape, 3), np.array(flow.ends), case.t)
+    return np.swapaxes(turned, 1, 2) @ start
+
+
+def _at_fitted_rates(case: Compared) -> Compared:
+    """Return the case whose initial state fits the rates of all rows, because the integral collects the noise of the first row.
+
+    Without a field and loads, rates do not depend on the attitude. An attitude that differs by more than the noise is not one.
+    """
+    alone = replace(case, data=(None, case.data[1]), free=case.free[3:] if case.scene.free else case.free)
+    if not alone.free:
+        return case
+    initial = alone.fit(exact(alone), np.zeros(0), np.zeros(0))[0]
+    if np.linalg.norm(initial[:3]) > case.allowed[0]:
+        initial = replace(alone, free=case.free[3:]).fit(exact(alone), np.zeros(0), np.zeros(0))[0]
+    return replace(case, scene=alone.at(initial).scene)
+
+
+def _drifts(case: Compared, asked: _Asked) -> Explanations:
+    """Yield attitudes that drift against rates that are right, at a constant rate."""
+    R, w = case.data
+    if R is None or w is None or case.step is not None:
+        return
+    case = _at_fitted_rates(case)
+    if case.errors(*case.exact)[1].max() > case.allowed[1]:
+        return
+    some = case.take(np.unique(np.linspace(0, len(case.t) - 1, DRIFTING_ROWS).astype(int)))
+    start, fitted = (case.scene.R_WB0, case.scene.w_WB_B0), Drifting(some, case.scene.R_WB0, case.scene.w_WB_B0, some.exact[0])
+    whole = Drifting(case, *start, case.exact[0])
+    for drift in DRIFTS:
+        numbers, offset = _fit_drift(fitted, drift)
+        values = dict(zip((number.name for number in drift.numbers), numbers.tolist(), strict=True))
+        yield explain(case, by_drift(drift), (offset @ whole(drift, numbers), case.exact[1]), values)
+
+
+def _fit_drift(drifting: Drifting, drift: Drift) -> tuple[Array, Array]:
+    """Return the numbers of a drift that fit attitudes best, and the turn (3, 3) of the world by which a noisy start is off.
+
+    More and more rows are fitted, because a small error of the rate turns late attitudes by any angle.
+    """
+    case, numbers, offset, small = drifting.case, np.zeros(len(drift.numbers)), np.eye(3), 1e-6 * drifting.case.scale
+    assert case.data[0] is not None
+    case.effort.spend(DRIFTING_EFFORT)
+    for _ in range(MOST_FITS):
+        made = offset @ drifting(drift, numbers)
+        apart = _angles(made, case.data[0])
+        far = np.flatnonzero(np.linalg.norm(apart, axis=1) > 1)
+        near = slice(0, max(int(far[0]), 4) if len(far) else len(apart))
+        moved = [_angles(made, offset @ drifting(drift, numbers + small * e))[near] / small for e in np.eye(len(numbers))]
+        slopes = np.stack([x.ravel() for x in moved], axis=1)
+        if case.free:
+            slopes = np.hstack([slopes, np.swapaxes(made, 1, 2)[near].reshape(-1, 3)])
+        change = np.linalg.lstsq(slopes, apart[near].ravel(), rcond=None)[0]
+        numbers = numbers + change[: len(numbers)]
+        offset = Rotation.from_rotvec(change[len(numbers) :]).as_matrix() @ offset if case.free else offset
+        if near.stop == len(apart) and np.abs(slopes @ change).max() < 1e-14:
+            break
+    return numbers, offset if angle_between(offset, np.eye(3)) <= case.allowed[0] else np.eye(3)
+
+
+def _angles(first: Array, second: Array) -> Array:
+    """Return the rotation vectors (n, 3) in body axes from attitudes to others."""
+    return Rotation.from_matrix(np.swapaxes(first, 1, 2) @ second).as_rotvec()
 
 
 def _habits(case: Compared, asked: _Asked) -> Explanations:
@@ -524,32 +612,46 @@ def _off_rows(error: Array) -> Any:
     return off if 0 < off.sum() <= 0.1 * n else None
 
 
+def _sensors(case: Compared, asked: _Asked) -> Explanations:
+    """Yield rates and attitudes in axes that are turned against each other, and rates of another size or with a bias."""
+    R, w = case.data
+    if R is None or w is None or len(case.scene.breaks) > MOST_BREAKS:
+        return
+    turns = Rotation.from_matrix(np.swapaxes(R[:-1], 1, 2) @ R[1:]).as_rotvec() / np.diff(case.t)[:, None]
+    w = (w[1:] + w[:-1]) / 2
+    for key, sign, of in (("rates in turned axes", 1.0, 1), ("rates in mirrored axes", -1.0, 1), ("turned attitudes", 1.0, 0)):
+        U, _, V = np.linalg.svd((sign * w).T @ turns)  # sign w = C' turns
+        C = V.T @ np.diag([1, 1, np.linalg.det(U @ V)]) @ U.T
+        turn = Rotation.from_matrix(C if of else C.T).as_rotvec()
+        best = attempt(case, compose(BY_KEY[key]), turn.tolist(), most=20)
+        yield best and _shortest_turn(best)
+    yield attempt(case, compose(BY_KEY["bias of the rates"]), (w - turns).mean(axis=0).tolist(), most=20)
+    size = float((w * turns).sum() / ((turns * turns).sum() or 1.0))
+    yield attempt(case, compose(BY_KEY["size of the rates"]), [size], most=20) if abs(size) > 1e-3 else None
+
+
 def _turned_axes(case: Compared, asked: _Asked) -> Explanations:
-    """Yield rates in turned or mirrored axes, and turned body axes, from the best of 24 directions."""
+    """Yield turned axes of the world or of the body, from the best of 24 directions."""
     if len(case.scene.breaks) > MOST_BREAKS:
         return
-    R, w = case.data
-    if R is not None and w is not None:
-        right = case.exact[1]
-        if case.from_row:  # the rates that the attitudes have
-            turns = Rotation.from_matrix(np.swapaxes(R[:-1], 1, 2) @ R[1:]).as_rotvec() / np.diff(case.t)[:, None]
-            right, w = turns, (w[1:] + w[:-1]) / 2
-        for key, sign in (("rates in turned axes", 1.0), ("rates in mirrored axes", -1.0)):
-            U, _, V = np.linalg.svd((sign * w).T @ right)  # sign w = C' right
-            C = V.T @ np.diag([1, 1, np.linalg.det(U @ V)]) @ U.T
-            best = attempt(case, compose(BY_KEY[key]), Rotation.from_matrix(C).as_rotvec().tolist(), most=20)
-            yield best and _shortest_turn(best)
-        yield attempt(case, compose(BY_KEY["bias of the rates"]), (w - right).mean(axis=0).tolist(), most=20)
-        size = float((w * right).sum() / ((right * right).sum() or 1.0))
-        yield attempt(case, compose(BY_KEY["size of the rates"]), [size], most=20) if abs(size) > 1e-3 else None
-    trial, near, turns = compose(BY_KEY["body axes"]), case.first(3.0, 10), Rotation.create_group("O").as_rotvec()
+    if case.data[0] is not None and not (case.from_row and case.scene.free):  # it moves equally in any axes of the world
+        yield _best_turn(case, compose(BY_KEY["turned world"]))
+    yield _best_turn(case, compose(BY_KEY["body axes"]))
+
+
+def _best_turn(case: Compared, trial: Trial) -> Explanation | None:
+    near, turns = case.first(3.0, 10), Rotation.create_group("O").as_rotvec()
     motion = trial.build(near)
     assert motion is not None
     many = np.broadcast_to(case.scene.R_WB0, (24, 3, 3)), np.broadcast_to(case.scene.w_WB_B0, (24, 3))
     left = np.linalg.norm(near.differences(*motion(*many, turns, len(near.t))), axis=(1, 2))
     explanations = [attempt(case, trial, turns[k].tolist(), most=30) for k in np.argsort(left, kind="stable")[:3]]
     shortest = [_shortest_turn(explanation) for explanation in explanations if explanation is not None]
-    yield min(shortest, key=lambda explanation: (round(explanation.share, 3), np.linalg.norm([*explanation.values.values()])))
+    return min(
+        shortest,
+        key=lambda explanation: (round(explanation.share, 3), np.linalg.norm([*explanation.values.values()])),
+        default=None,
+    )
 
 
 def _shortest_turn(explanation: Explanation) -> Explanation:
@@ -626,8 +728,8 @@ def _with_inertia(case: Compared, inertia: Callable[[Array], Array]) -> Solution
     return motion
 
 
-def _other_body(case: Compared) -> Explanation:
-    """Return the explanation by another inertia."""
+def _other_body(case: Compared) -> Explanation | None:
+    """Return the explanation by another inertia; None if none can explain the first rows."""
     free = case.scene.free and case.scene.body.rotor_momentum is None
     J = case.scene.body.inertia
 
@@ -640,7 +742,8 @@ def _other_body(case: Compared) -> Explanation:
     numbers = tuple(Number(f"stretch_{name}") for name in _INERTIA)
     trial = Trial((mistake,), lambda of: _with_inertia(of, inertia), numbers)
     explanation = attempt(case, replace(trial, mistakes=(replace(mistake, sentence=""),)))  # its sentence has no fitted number
-    assert explanation is not None
+    if explanation is None:
+        return None
     (a, b, c), (d, e, f) = (
         (made := inertia(np.array([*explanation.values.values()])))[[0, 1, 2], [0, 1, 2]],
         made[[0, 0, 1], [1, 2, 2]],
@@ -660,38 +763,129 @@ def _steps(case: Compared, asked: _Asked) -> Explanations:
         mistake = BY_KEY[fitted.keys[0]]
         if not isinstance(mistake, SceneMistake) or fitted.explains:
             continue
-        factor = _round_factor(case, fitted)
-        other = mistake.change(case.scene, factor)
-        explanations = [*find_steps(replace(case, scene=other))] if other is not None else []
-        for explanation in explanations:
-            if explanation.trial is not None and explanation.made is not None:
-                both = Trial((mistake, *explanation.trial.mistakes), _in_scene(mistake, factor, explanation.trial))
-                rows = case.take(slice(0, len(explanation.made[0])))
-                yield explain(rows, both, explanation.made, {"factor": factor} | explanation.values)
-        if any(explanation.explains for explanation in explanations):
+        explanations = [*_steps_in(case, {mistake: fitted.values["factor"]})]
+        yield from explanations
+        if any(explanation is not None and explanation.explains for explanation in explanations):
             return
     if not any(explanation.explains for explanation in asked.tried):
-        yield from find_steps(case)
+        yield from _steps_in(case, {})
 
 
-def _round_factor(case: Compared, explanation: Explanation) -> float:
-    """Return the factor with the fewest digits that leaves at most twice as much as the one that was fitted."""
-    factor, trial = explanation.values["factor"], explanation.trial
-    motion = None if trial is None else trial.build(case)
-    for digits in (1, 2, 3, 4) if motion is not None else ():
-        rounded = float(f"{factor:.{digits}g}")
-        if rounded != 1 and motion is not None:
-            R, w = case.evaluate(motion, np.append(np.zeros(6), rounded)[None])
-            if case.size(case.errors(R[0], w[0])) <= 2 * explanation.size:
-                return rounded
-    return factor
+Sizes = Mapping[SceneMistake, float]
+"""Factors of numbers of a scene."""
 
 
-def _in_scene(mistake: SceneMistake, number: float, trial: Trial) -> Callable[[Compared], Solution | None]:
-    """Return the motion of a trial in the scene with a mistake."""
+def _steps_in(case: Compared, sizes: Sizes) -> Explanations:
+    """Yield integrators of a scene whose numbers have other sizes.
+
+    If an integrator leaves little, these and other sizes are fitted to what it leaves, and it runs again. A size that was
+    fitted without the integrator has a part of its error: the integrator is the one that explains most beside all sizes.
+    """
+    best: Explanation | None = None
+    if sizes:
+        if (scene := _resize(case.scene, sizes)) is None:
+            return
+        of_scene = replace(case, scene=scene)
+        linear = Linearised(of_scene, [*_columns(of_scene).values()])
+        left, parts, _, integrator = linear.rank()[0]
+        if left > LITTLE:
+            return
+        made = linear.errors(integrator.step, parts)
+        sizes = _refine(of_scene, linear.away[: linear.used] - made, sizes)
+        trial: Trial | None = by_step(integrator, parts)
+        best = _attempt_steps(case, sizes, trial, float(case.t[1] - case.t[0]) / parts)
+        yield best
+    else:
+        for explanation in find_steps(case):
+            yield explanation
+            if best is None or (not explanation.explains, explanation.share) < (not best.explains, best.share):
+                best = explanation
+        trial = None if best is None else best.trial
+    for _ in range(REFINED):
+        if best is None or best.explains or best.share > NEARLY or trial is None or best.made is None:
+            return
+        rows = replace(case, scene=_resize(case.scene, sizes) or case.scene).take(slice(0, len(best.made[0])))
+        R, w = (x if y is None else y for x, y in zip(best.made, rows.data, strict=True))
+        sizes = _refine(rows, differ(*best.made, R, w, rows.scale), sizes)
+        best = _attempt_steps(case, sizes, trial, best.values["step"])
+        yield best
+
+
+def _attempt_steps(case: Compared, sizes: Sizes, trial: Trial | None, step: float) -> Explanation | None:
+    """Return the explanation by an integrator in the scene whose numbers have other sizes."""
+    scene = _resize(case.scene, sizes)
+    if scene is None or trial is None:
+        return None
+    explanation = attempt(replace(case, scene=scene), trial, known={"step": step}, ranked=True)
+    return None if explanation is None else _in_sizes(case, sizes, explanation)
+
+
+def _resize(scene: Scene, sizes: Sizes) -> Scene | None:
+    """Return the scene with other sizes of its numbers; None if it has not all of them."""
+    for mistake, factor in sizes.items():
+        other = scene if factor == 1 else mistake.change(scene, factor)
+        if other is None:
+            return None
+        scene = other
+    return scene
+
+
+def _columns(case: Compared) -> dict[SceneMistake, Array]:
+    """Return the differences (n, 6) that the size of each number of the scene makes, to first order, for a change of 1."""
+    out = dict[SceneMistake, Array]()
+    for mistake in SIZES:
+        other = mistake.change(case.scene, 1 + SMALL_SHARE)
+        if other is not None:
+            made = truth(other, case.start, case.t)
+            out[mistake] = differ(*case.exact, *made, case.scale) / SMALL_SHARE
+    return out
+
+
+def _refine(case: Compared, left: Array, sizes: Sizes) -> Sizes:
+    """Return the fewest sizes of numbers of the scene that explain, to first order, differences (n, 6) of the first rows.
+
+    `sizes` are the ones of the case so far.
+    """
+    some = case.take(slice(0, len(left)))
+    weights = np.repeat([float(x is not None) for x in some.data] / some.noise, 3)
+    wanted, flow = (left * weights).ravel(), linearise(some)[2]
+    starts = [(flow[:, :, k] * weights).ravel() for k in some.free]
+    columns = {mistake: (x * weights).ravel() for mistake, x in _columns(some).items()}
+    fits = list[tuple[float, tuple[SceneMistake, ...], Any]]()
+    for count in range(len(columns) + 1):
+        for chosen in combinations(columns, count):
+            matrix = np.stack([*(columns[mistake] for mistake in chosen), *starts, 0 * wanted], axis=1)
+            numbers = np.linalg.lstsq(matrix, wanted, rcond=None)[0]
+            fits.append((float(np.linalg.norm(wanted - matrix @ numbers)), chosen, numbers))
+    _, chosen, numbers = next(fit for fit in fits if fit[0] <= 2 * min(size for size, *_ in fits))
+    changes = dict(zip(chosen, numbers.tolist(), strict=False))
+    return {
+        mistake: sizes.get(mistake, 1.0) * (1 + changes.get(mistake, 0.0))
+        for mistake in SIZES
+        if mistake in {**sizes, **changes}
+    }
+
+
+def _in_sizes(case: Compared, sizes: Sizes, explanation: Explanation) -> Explanation:
+    """Return an explanation in a scene with other sizes of its numbers as an explanation of the case in its own scene."""
+    trial = explanation.trial
+    if not sizes or trial is None or explanation.made is None:
+        return explanation
+    named = [
+        replace(mistake, sentence=mistake.sentence.format(factor=factor) + _digits_of(case.scene, mistake, factor), numbers=())
+        for mistake, factor in sizes.items()
+    ]
+    both = Trial((*named, *trial.mistakes), _in_scene(sizes, trial))
+    rows = case.take(slice(0, len(explanation.made[0])))
+    values = {f"factor {i}" if i else "factor": factor for i, factor in enumerate(sizes.values())}
+    return explain(rows, both, explanation.made, values | explanation.values)
+
+
+def _in_scene(sizes: Sizes, trial: Trial) -> Callable[[Compared], Solution | None]:
+    """Return the motion of a trial in the scene with other sizes of its numbers."""
 
     def build(case: Compared) -> Solution | None:
-        other = mistake.change(case.scene, number)
+        other = _resize(case.scene, sizes)
         return None if other is None else trial.build(replace(case, scene=other))
 
     return build
@@ -753,10 +947,13 @@ SEARCHES = {
     "other equations": Search(_changes, frozenset({"scenes", "equations"}), 0.3),
     "other readings": Search(_readings, frozenset({"readings"}), 0.1, ends=True),
     "habits": Search(_habits, frozenset({"habits"}), 0.1, least=1),
+    "resampled rows": Search(lambda case, asked: find_resampled(case), frozenset({"rows"}), 0.05, ends=True, whole=True),
     "wrong rows": Search(_rows, frozenset({"rows"}), 0.01, ends=True),
     "other times": Search(_times, frozenset({"times"}), 0.1),
+    "axes and sizes of rates": Search(_sensors, frozenset({"readings"}), 0.1),
     "fitted numbers": Search(_numbers, frozenset({"scenes", "equations"}), 0.15),
     "attitudes from rates": Search(_attitudes, frozenset({"attitudes"}), 0.3, ends=True),
+    "drifting attitudes": Search(_drifts, frozenset({"attitudes"}), 0.1, ends=True),
     "integrators": Search(_steps, frozenset({"steps"}), 0.25, ends=True),
     "several mistakes": Search(_several, frozenset({"readings", "times", "scenes", "equations"}), 0.1, ends=True),
     "other axes": Search(_turned_axes, frozenset({"readings"}), 0.1),

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
 
 from conservative.attitude import Array
 
-from .compare import HOPELESS, Compared, Solution
+from .compare import HOPELESS, MOST_NOISE, Compared, Solution
 from .finding import Cause
 from .mistakes.mistake import Mistake, Number
 
@@ -21,6 +21,32 @@ OWN_SHARE = 0.02
 """Share of the effect of a mistake, found in another motion, that the steps of a program may change."""
 OWN_ERROR = 3.0
 """Allowed errors that a program may leave with a mistake: its steps have errors on the motion with the mistake, too."""
+
+
+INTERVAL = 1e-6
+"""Change of numbers from which their intervals are computed."""
+EXACT = 1e-9
+"""Interval, relative to a number (or to 1e-3), below which a sentence has the number alone."""
+
+
+class Measured(float):
+    """A fitted number, which is formatted with its `interval`: two standard deviations for the noise of the rows."""
+
+    interval: float
+
+    def __new__(cls, value: float, interval: float) -> Measured:
+        """Return a number with an interval."""
+        made = super().__new__(cls, value)
+        made.interval = interval
+        return made
+
+    def __format__(self, spec: str) -> str:
+        """Return the number with as many digits as its interval has, and the interval."""
+        if not self.interval > EXACT * max(abs(self), 1e-3):
+            return format(0.0 if abs(self) <= self.interval else float(self), spec)
+        digits = math.floor(math.log10(abs(self) or self.interval)) - math.floor(math.log10(self.interval)) + 1
+        sign = "+" if spec.startswith("+") else ""
+        return f"{float(self):{sign}.{max(1, digits)}g} ± {self.interval:.1g}"
 
 
 @dataclass(frozen=True)
@@ -98,6 +124,20 @@ class Explanation:
         values = MappingProxyType(self.values)
         return Cause(self.keys, self.sentence, self.left[worst], self.plain[worst], values, "; ".join(remedies))
 
+    def with_intervals(self, case: Compared) -> Explanation:
+        """Return the explanation with intervals of the fitted numbers, if its motion is a function of them."""
+        trial = self.trial
+        motion = None if trial is None or not trial.numbers else trial.build(case)
+        if trial is None or motion is None or any(number.name not in self.values for number in trial.numbers):
+            return self
+        values = [self.values[number.name] for number in trial.numbers]
+        intervals = 2 * case.deviations(motion, np.array([*[0.0] * 6, *values]), INTERVAL)[6:]
+        if not np.isfinite(intervals).all():
+            return self
+        measured = {number.name: Measured(x, d) for number, x, d in zip(trial.numbers, values, intervals.tolist(), strict=True)}
+        known = self.values | measured
+        return replace(self, values=known, sentence=self.sentence.replace(trial.sentence(self.values), trial.sentence(known)))
+
     def again(self, case: Compared) -> Explanation | None:
         """Return the explanation of another case by the same mistakes with the same numbers, without any fit.
 
@@ -148,7 +188,7 @@ def explain(
         plain.tolist(),
         float(error.max() / max(plain.max(), 1e-15)),
         case.size(error),
-        _is_allowed(case, error, share * plain) and rest < HALF,
+        _is_allowed(case, made, error, share * plain) and rest < HALF,
         len(values) if numbers is None else numbers,
         made,
         rest,
@@ -157,13 +197,15 @@ def explain(
     )
 
 
-def _is_allowed(case: Compared, error: Array, more: Array) -> bool:
+def _is_allowed(case: Compared, made: tuple[Array, Array], error: Array, more: Array) -> bool:
     """Return whether a mistake may leave errors (2, n).
 
     A program with a mistake has an error of its steps as well: some tolerances, or errors `more` (2,) that are proportional to
     the step and to the effect of the mistake, such as of damping after each step.
     """
     if case.step is None:
+        if any(case.open):
+            error = np.where(case.leaves_noise(*made)[:, None], 0.0, error)
         return case.passes(error)
     return bool((error.max(axis=1) <= np.maximum(OWN_ERROR * case.allowed, more)).all())
 
@@ -175,23 +217,31 @@ def attempt(
     small: float = 1e-6,
     most: int = 8,
     known: Mapping[str, float] = MappingProxyType({}),
+    ranked: bool = False,
 ) -> Explanation | None:
     """Return the explanation by a motion whose initial state and other numbers are fitted as far as they are open.
 
     `start` are the numbers to start with, SI, and `small` is their change for slopes in their units; `most` is the number of
     iterations. Mistakes that explain too little of the first rows are not tried on all. `known` are other numbers of the
-    sentence, which `build` has. None if the mistakes cannot be applied.
+    sentence, which `build` has. None if the mistakes cannot be applied, or cannot explain the first rows to first order, which
+    is not asked again if the mistakes are `ranked` by it.
     """
     if case.screen is not None:
-        explanation = _attempt(case.screen, trial, start, small, most, known)
+        explanation = _attempt(case.screen, trial, start, small, most, known, ranked)
         if explanation is None or (not explanation.explains and explanation.rest > HALF):
             return explanation
         start = [explanation.values[number.name] for number in trial.numbers]
-    return _attempt(case, trial, start, small, most, known)
+    return _attempt(case, trial, start, small, most, known, ranked)
 
 
 def _attempt(
-    case: Compared, trial: Trial, start: Sequence[float] | None, small: float, most: int, known: Mapping[str, float]
+    case: Compared,
+    trial: Trial,
+    start: Sequence[float] | None,
+    small: float,
+    most: int,
+    known: Mapping[str, float],
+    ranked: bool,
 ) -> Explanation | None:
     motion = trial.build(case)
     if motion is None:
@@ -202,9 +252,13 @@ def _attempt(
     def scaled(R: Array, w: Array, p: Array, n: int) -> tuple[Array, Array]:
         return motion(R, w, p * units, n)
 
-    _, p, made = case.change(free=()).fit(scaled, p, np.full(len(p), small), most)
+    small_changes = np.full(len(p), small)
+    if not ranked and not case.may_explain(scaled, p, small_changes):
+        return None
+    _, p, made = case.change(free=()).fit(scaled, p, small_changes, most)
     error = case.errors(*made)
-    if case.free and not case.passes(error) and (error.max(axis=1) <= HOPELESS * case.noise * case.growth).any():
-        _, p, made = case.fit(scaled, p, np.full(len(p), small), most)
+    near = (error.max(axis=1) <= HOPELESS * np.where(case.open, MOST_NOISE, case.noise) * case.growth).any()
+    if case.free and near and not case.passes(error):
+        _, p, made = case.fit(scaled, p, small_changes, most)
     names = (number.name for number in trial.numbers)
     return explain(case, trial, made, dict(zip(names, (p * units).tolist(), strict=True)) | dict(known))

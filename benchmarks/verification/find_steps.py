@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from conservative.attitude import Array, to_quaternion
+from conservative.attitude import Array, from_quaternion, to_quaternion
+from conservative.scene import Scene
 
 from .compare import HOPELESS, LINEAR, Compared, Solution, differ, linearise, weigh
 from .explanation import Explanation, Trial, attempt
 from .mistakes.steps import INTEGRATORS, Integrator, Step
-from .solution import Equations, truth
+from .solution import Derivative, Equations, truth
 
-CHUNK, CHUNK_EFFORT = 256, 8
+CHUNK, CHUNK_EFFORT = 256, 100
 """Steps after which work is counted, and their work (`Effort`)."""
-ROWS, STEP_EFFORT = 400, 0.15
+ROWS, STEP_EFFORT = 400, 1.0
 """Largest number of rows that candidates are compared with, and the work of one step from all of them."""
 STEPS_AT_MOST, PARTS = 20_000, 2000
 """Largest numbers of steps of a method, over the file and between two rows."""
+CLOSE = 1e-7
+"""Time between two values of a motor for its slope, relative, if it is a function."""
+MOST_KEPT = 50_000
+"""Largest number of times whose loads are kept."""
 CANDIDATES = 5
 """Number of methods that run from the first row."""
 FIRST_STEPS = 2000
@@ -29,37 +35,92 @@ FIRST_STEPS = 2000
 
 @dataclass(frozen=True, eq=False)
 class Slope:
-    """The derivative of states (7, n), at one time or at a time for each of them, s."""
+    """The derivative of states (7, n), at one time or at a time for each of them, s.
+
+    A state is a quaternion and rates, as simulators have it: a motor acts by its torque -h' at the times of the method, where
+    `Equations` integrate its momentum. Loads at one time are kept: a method runs many times over the same times.
+    """
 
     equations: Equations
-    known: dict[str, Any] = field(default_factory=dict)
+    known: dict[float, tuple[Derivative, Array, Array]] = field(default_factory=dict)
 
     @property
     def body(self) -> Any:
         return self.equations.scene.body
 
+    def rotor(self, t: Any) -> Any:
+        """Return the momentum (3, n) or (3, 1) of the rotor, kg m^2/s; 0 without one."""
+        if self.body.motor is not None:
+            return np.array([self.body.motor.at(time) for time in np.atleast_1d(t).tolist()]).T
+        return np.zeros((3, 1)) if self.body.rotor_momentum is None else self.body.rotor_momentum[:, None]
+
     def rates(self, t: Any, y: Array) -> Array:
         """Return the angular velocities (3, n) of states."""
-        return y[4:] if self.body.motor is None else y[4:] - self.equations.wheel(np.atleast_1d(t))
+        return y[4:]
 
     def __call__(self, t: Any, y: Array) -> Array:
-        if self.equations.steady:
-            if "slope" not in self.known:
-                self.known["slope"] = self.equations.at(np.zeros(1))
-            return self.known["slope"](y[:, :, None])[:, :, 0]
-        if np.ndim(t) == 0:
-            return self.equations.at(np.array([t]))(y[:, :, None])[:, :, 0]
-        return self.equations.at(np.asarray(t))(y[:, None])[:, 0]
+        if np.ndim(t):
+            derivative, wheel, faster = self._at(np.asarray(t))
+            return self._apply(derivative, wheel, faster, y[:, None])[:, 0]
+        t = 0.0 if self.equations.steady else float(t)
+        if t not in self.known:
+            if len(self.known) > MOST_KEPT:
+                self.known.clear()
+            self.known[t] = self._at(np.array([t]))
+        return self._apply(*self.known[t], y[:, :, None])[:, :, 0]
+
+    def _at(self, t: Array) -> tuple[Derivative, Array, Array]:
+        """Return the derivative at times (n,), s, and J^-1 h and J^-1 h' (3, n) of a motor."""
+        nothing = np.zeros((3, 1))
+        if self.body.motor is None:
+            return self.equations.at(t), nothing, nothing
+        changes = np.array([slope_of_motor(self.body.motor, time) for time in t.tolist()])
+        return self.equations.at(t), self.equations.wheel(t), self.equations.reaction * (self.body.inverse @ changes.T)
+
+    def _apply(self, derivative: Derivative, wheel: Array, faster: Array, y: Array) -> Array:
+        if self.body.motor is None:
+            return derivative(y)
+        moved, shape = y.copy(), (3, 1, -1) if y.shape[1] == 1 else (3, -1, 1)
+        moved[4:] += wheel.reshape(shape)
+        out = derivative(moved)
+        out[4:] -= faster.reshape(shape)
+        return out
+
+
+def slope_of_motor(motor: Any, t: float) -> Array:
+    """Return the change (3,) of a motor's momentum at a time and just after it, N m."""
+    if isinstance(motor.value, tuple):
+        times, values = motor.value
+        k = int(np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(times) - 2))
+        return np.asarray((values[k + 1] - values[k]) / (times[k + 1] - times[k]))
+    e = CLOSE * max(abs(t), 1.0)
+    return np.asarray((motor.at(t + e) - motor.at(t)) / e)
+
+
+def pack(R: Array, w: Array) -> Array:
+    """Return the states (7, n) of attitudes (n, 3, 3) and rates (n, 3)."""
+    return np.concatenate([to_quaternion(R).T, w.T])
+
+
+def unpack(y: Array) -> tuple[Array, Array]:
+    """Return attitudes (..., 3, 3) and rates (..., 3) of states (7, ...)."""
+    q = y[:4] / np.sqrt((y[:4] * y[:4]).sum(axis=0))
+    return from_quaternion(np.moveaxis(q, 0, -1)), np.moveaxis(y[4:], 0, -1)
+
+
+@lru_cache(maxsize=4)
+def slope_of(scene: Scene) -> Slope:
+    """Return the derivative of a scene, which trial runs share."""
+    return Slope(Equations(scene))
 
 
 def march(case: Compared, method: Step, parts: int) -> Solution:
     """Return the motion by a method with `parts` steps between two rows, which are equally far apart."""
-    equations = Equations(case.scene)
-    weight = weigh(case.scene)
-    f, h = Slope(equations), float(case.t[-1] - case.start) / (count_gaps(case)[-1] * parts)
+    f, weight = slope_of(case.scene), weigh(case.scene)
+    h = float(case.t[-1] - case.start) / (count_gaps(case)[-1] * parts)
 
     def motion(R: Array, w: Array, _: Array, n: int) -> tuple[Array, Array]:
-        y, past, kept, numbers = equations.pack(case.start, R, w), list[Array](), list[Array](), count_gaps(case)[:n] * parts
+        y, past, kept, numbers = pack(R, w), list[Array](), list[Array](), count_gaps(case)[:n] * parts
         last, wanted = int(numbers[-1]), set(numbers.tolist())
         with np.errstate(all="ignore"):
             for number in range(last + 1):
@@ -76,7 +137,7 @@ def march(case: Compared, method: Step, parts: int) -> Solution:
                     y = new
                     if method.normalised:
                         y[:4] /= np.sqrt((y[:4] * y[:4]).sum(axis=0))
-            return equations.states(np.stack(kept, axis=2), case.t[:n])
+            return unpack(np.stack(kept, axis=2))
 
     return motion
 
@@ -122,13 +183,13 @@ def find_steps(case: Compared) -> Iterator[Explanation]:
 def _run_best(case: Compared, linear: Linearised) -> Iterator[Explanation]:
     """Yield motions by the methods that leave the smallest shares."""
     step_of_rows = float(np.diff(case.t).mean())
-    ranked = sorted(
-        ((*linear.best(method.step), method.key, method) for method in INTEGRATORS), key=lambda candidate: candidate[:3]
-    )
+    ranked = linear.rank()
     proven = False
     for left, parts, _, integrator in ranked[:CANDIDATES]:
-        # Few rows do not rule out a method. After an explanation, others are tried only if they leave about as little.
-        if (left > 0.5 and linear.used > 8) or (proven and left > max(0.02, 10 * ranked[0][0])):
+        # Few rows do not rule out a method, and methods that leave much more than the best one are not it.
+        if linear.used > 8 and left > min(0.5, max(0.02, 10 * ranked[0][0])):
+            continue
+        if proven and left > max(0.02, 10 * ranked[0][0]):
             continue
         if case.effort.over:
             return
@@ -138,7 +199,7 @@ def _run_best(case: Compared, linear: Linearised) -> Iterator[Explanation]:
                 if len(some.t) < len(case.t) and (some.plain.max(axis=1) <= some.allowed).all():
                     continue  # these rows do not differ from the exact motion
                 step = step_of_rows / count
-                explanation = attempt(some, by_step(integrator, count), known={"step": step})
+                explanation = attempt(some, by_step(integrator, count), known={"step": step}, ranked=True)
                 if explanation is None or explanation.share > 0.5 or len(some.t) == len(case.t):
                     break
             if explanation is None:
@@ -150,24 +211,28 @@ def _run_best(case: Compared, linear: Linearised) -> Iterator[Explanation]:
 
 
 class Linearised:
-    """The rows' differences from the exact motion, and those that a method makes, to first order."""
+    """The rows' differences from the exact motion, and those that a method makes, to first order.
 
-    def __init__(self, case: Compared) -> None:
-        self.case, equations = case, Equations(case.scene)
+    `also` (n, 6) are differences for other numbers of the scene, which are fitted beside the method.
+    """
+
+    def __init__(self, case: Compared, also: Sequence[Array] = ()) -> None:
+        self.case, self.f = case, slope_of(case.scene)
+        self.equations = self.f.equations
         self.R, self.w, self.flow = linearise(case)
         data = self.R if case.data[0] is None else case.data[0], self.w if case.data[1] is None else case.data[1]
-        self.wanted = differ(self.R, self.w, *data, case.scale)
-        size = np.linalg.norm(self.wanted, axis=1)
+        self.away = differ(self.R, self.w, *data, case.scale)
+        size = np.linalg.norm(self.away, axis=1)
         self.used = int(np.argmax(size > LINEAR)) if (size > LINEAR).any() else len(size)
         self.used = min(max(self.used, min(len(size), 8)), ROWS)
         have = [x is not None for x in case.data]
         self.weights = np.repeat(np.array(have) / case.noise, 3)
-        self.f, self.equations = Slope(equations), equations
         self.inverse = np.linalg.pinv(self.flow[: self.used])
         self.made: dict[tuple[int, int], Array] = {}
         free = list(case.free) if (case.error.max(axis=1) <= HOPELESS * case.noise * case.growth).any() else []
-        self.starts = np.stack([(self.flow[: self.used, :, k] * self.weights).ravel() for k in free], axis=1) if free else None
-        self.wanted = self.beside_start(self.wanted)
+        beside = [*(self.flow[:, :, k] for k in free), *also]
+        self.starts = np.stack([(x[: self.used] * self.weights).ravel() for x in beside], axis=1) if beside else None
+        self.wanted = self.beside_start(self.away)
 
     def errors(self, method: Step, parts: int) -> Array:
         """Return the errors (n, 6) of a method in the rows that are used."""
@@ -180,11 +245,11 @@ class Linearised:
             self.made[id(method), parts] = errors = differ(self.R[:n], self.w[:n], R[0], w[0], case.scale)
             return errors
         t, h = case.t[: n - 1], float(case.t[n - 1] - case.t[0]) / (n - 1) / parts
-        y = np.concatenate([to_quaternion(self.R[: n - 1]).T, self.w[: n - 1].T + self.equations.wheel(t)])
+        y = pack(self.R[: n - 1], self.w[: n - 1])
         past: list[Array] = []
         for back in range(1, method.past + 1):
             a, b = truth(case.scene, case.start, np.maximum(t - back * h, case.start))
-            past.append(np.concatenate([to_quaternion(a).T, b.T + self.equations.wheel(t)]))
+            past.append(pack(a, b))
             past[-1][:4] *= np.sign((past[-1][:4] * y[:4]).sum(axis=0))
         first, before = y[:, :1], list[Array]()  # a method begins without a past
         with np.errstate(all="ignore"):
@@ -195,8 +260,8 @@ class Linearised:
                     new = method.next(self.f, t[:1] + number * h, first, h, before)
                     first, before = new, [first, *before][: method.past]
             y[:, :1] = first if method.past else y[:, :1]
-            a, b = self.equations.states(y[:, None], case.t[1:n])
-        defect = differ(self.R[1:n], self.w[1:n], a[0], b[0], case.scale)
+            a, b = unpack(y)
+        defect = differ(self.R[1:n], self.w[1:n], a, b, case.scale)
         carried = np.cumsum((self.inverse[1:n] @ defect[..., None])[..., 0], axis=0)
         errors = np.concatenate([np.zeros((1, 6)), (self.flow[1:n] @ carried[..., None])[..., 0]])
         self.made[id(method), parts] = errors
@@ -229,6 +294,11 @@ class Linearised:
             parts = int(np.clip(np.rint(wanted), 1, most))
         return min((left, n) for n, left in shares.items())
 
+    def rank(self) -> list[tuple[float, int, str, Integrator]]:
+        """Return integrators with the shares that they leave, smallest first, and their numbers of steps between two rows."""
+        ranked = ((*self.best(method.step), method.key, method) for method in INTEGRATORS)
+        return sorted(ranked, key=lambda candidate: candidate[:3])
+
     def others(self, method: Step, parts: int) -> list[int]:
         """Return the numbers of steps next to the best one that leave almost as little."""
         near = [n for n in (parts - 1, parts + 1) if n >= 1]
@@ -243,9 +313,10 @@ class RowByRow(Linearised):
     """
 
     def __init__(self, case: Compared) -> None:
-        self.case, self.equations = case, Equations(case.scene, most=case.most)
+        self.case, self.f = case, slope_of(case.scene)
+        self.equations = Equations(case.scene, most=case.most)
         self.used = n = min(len(case.t), 200)
-        self.f, self.made, self.starts = Slope(self.equations), {}, None
+        self.made, self.starts = {}, None
         R, w = case.data
         assert R is not None
         assert w is not None
@@ -261,10 +332,10 @@ class RowByRow(Linearised):
             return np.zeros((self.used - 1, 6))
         if (id(method), parts) not in self.made:
             self.case.effort.spend(STEP_EFFORT * parts)
-            y = self.equations.pack(0.0, self.R[:-1], self.w[:-1])
+            y = pack(self.R[:-1], self.w[:-1])
             with np.errstate(all="ignore"):
                 for _ in range(parts):
                     y = method.next(self.f, 0.0, y, self.gap / parts, [])
-                a, b = self.equations.states(y[:, :, None], np.zeros(1))
-            self.made[id(method), parts] = differ(*self.exact, a[:, 0], b[:, 0], self.case.scale)
+                made = unpack(y)
+            self.made[id(method), parts] = differ(*self.exact, *made, self.case.scale)
         return self.made[id(method), parts]

@@ -1,10 +1,11 @@
-"""Exact motions at the times of a file, and motions by other equations, of many initial states at once. Nothing is compiled."""
+"""Exact motions at the times of a file, and motions by other equations, of many initial states at once."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,10 +14,11 @@ from numpy.polynomial import chebyshev
 from conservative.attitude import Array, from_quaternion, to_quaternion
 from conservative.errors import PotentialFailed, TorqueFailed
 from conservative.features import IN_TIME
+from conservative.kernels import picard
 from conservative.potentials.field import FieldPotential
 from conservative.potentials.load import Window
 from conservative.potentials.potential import torque_W
-from conservative.potentials.turning import static_part
+from conservative.potentials.turning import Turning, static_part
 from conservative.references.exact.method import Exact, free_body, lagrange_top
 from conservative.scene import Scene
 
@@ -27,13 +29,19 @@ NODES, ANGLE, SWEEPS = 32, 2.0, 60
 SMALLEST, TAIL = 1e-6, 3e-15
 """Shortest stretch that is halved again, relative to the first one, and largest last coefficients of a good stretch."""
 _EPS = 2.0**-52
+NOTHING = np.empty((0, 3))
+"""Stands for no load."""
+Torque = Callable[[Array, Array], Array]
+"""From attitudes (B, n, 3, 3) and rates (B, n, 3) to torques (B, n, 3), N m, body axes."""
 
 _X = -np.cos(np.pi * np.arange(NODES) / (NODES - 1))
 """Chebyshev points from -1 to 1."""
 _COEFFICIENTS = np.linalg.inv(chebyshev.chebvander(_X, NODES - 1))
 """From values at the points to coefficients of their Chebyshev series."""
-_INTEGRAL = chebyshev.chebvander(_X, NODES) @ chebyshev.chebint(np.eye(NODES), lbnd=-1) @ _COEFFICIENTS
-"""From values at the points to their integrals from -1 to each point."""
+_INTEGRAL_T = np.ascontiguousarray(
+    (chebyshev.chebvander(_X, NODES) @ chebyshev.chebint(np.eye(NODES), lbnd=-1) @ _COEFFICIENTS).T
+)
+"""From values at the points to their integrals from -1 to each point, transposed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,82 +69,51 @@ class Equations:
     half_turned: bool = False
     most: float = math.inf
 
-    def at(self, t: Array, window: Window = (-math.inf, math.inf)) -> Callable[[Array], Array]:
+    def at(self, t: Array, window: Window = (-math.inf, math.inf)) -> Derivative:
         """Return the derivative of states (7, B, n) at times (n,), s, between two break points, s."""
-        body = self.scene.body
-        J, inverse = body.inertia, body.inverse
-        motor = None if body.motor is None else np.array([body.motor.at(time, None, window) for time in t.tolist()]).T
-        turning = None if motor is None else self.reaction * (inverse @ motor)
-        rotor = np.zeros(3) if body.rotor_momentum is None or motor is not None else body.rotor_momentum
-        spinning, side = J if self.spinning is None else self.spinning, -1.0 if self.left else 1.0
-        gyroscopic, turn = _column(self.gyroscopic), 0.5 * _column(self.turn)
-        load = self._loads(t, window)
-
-        def slope(y: Array) -> Array:
-            shape = y.shape[1:]
-            w = y[4:] if turning is None else y[4:] - turning.reshape(3, *(1,) * (y.ndim - 2), -1)
-            (q0, q1, q2, q3), (w1, w2, w3) = y[:4], turn * w
-            out = np.empty_like(y)
-            out[0] = -(q1 * w1 + q2 * w2 + q3 * w3)
-            out[1] = q0 * w1 + side * (q2 * w3 - q3 * w2)
-            out[2] = q0 * w2 + side * (q3 * w1 - q1 * w3)
-            out[3] = q0 * w3 + side * (q1 * w2 - q2 * w1)
-            if self.fixed is None and not self.half_turned:
-                if motor is None or (self.reaction == 1 and self.spinning is None):
-                    L = _apply(spinning, y[4:]) + rotor.reshape(3, *(1,) * len(shape))
-                else:
-                    L = _apply(spinning, w) + motor.reshape(3, *(1,) * (len(shape) - 1), -1)
-                torque = gyroscopic * cross(L, w)
-                out[4:] = _apply(inverse, torque if load is None else torque + load(y, w))
-            elif self.fixed is None:
-                T = J @ _matrix(y)  # R' (R J) R
-                L = (T @ np.moveaxis(w, 0, -1)[..., None])[..., 0] + rotor
-                torque = gyroscopic * cross(np.moveaxis(L, -1, 0), w) + (0.0 if load is None else load(y, w))
-                out[4:] = np.moveaxis(np.linalg.solve(T, np.moveaxis(torque, 0, -1)[..., None])[..., 0], -1, 0)
-            else:
-                R = _matrix(y)
-                L = _turn(R, 0 * w + rotor.reshape(3, *(1,) * len(shape)))
-                spin = _turn(R, w)
-                torque = gyroscopic * cross(L + _apply(self.fixed, spin), spin)
-                torque = torque if load is None else torque + _turn(R, load(y, w))
-                out[4:] = _turn(np.swapaxes(R, -1, -2), _apply(np.linalg.inv(self.fixed).astype(float), torque))
-            if np.any(self.damping):
-                out[4:] -= _column(self.damping) * w
-            return out
-
-        return slope
-
-    def _loads(self, t: Array, window: Window) -> Callable[[Array, Array], Array] | None:
-        """Return the torque (3, ...) of field and loads, N m, body axes, as a function of states and rates."""
         scene, torque, damping = self.scene, self.scene.torque, self.scene.damping
-        if scene.potential is None and torque is None and damping is None:
-            return None
-        of_time = damping and damping.of_time
-        M: Array | None = None
-        D: Array | None = None
-        if torque is not None and not torque.of_attitude:
-            M = np.array([torque.at(time, None, window) for time in t.tolist()])
-        if damping is not None and not (of_time and of_time.of_attitude):
-            D = np.array([damping.at(time, None, window) for time in t.tolist()])
-        field = None if scene.potential is None else _field(scene.potential, t)
-        turned = scene.potential is not None or (torque is not None and (torque.frame != "body" or torque.of_attitude))
-        turned = turned or bool(of_time and of_time.of_attitude)
+        body, of_time = scene.body, damping and damping.of_time
+        rotor, wheel, back, resistance = NOTHING, NOTHING, np.empty((0, 4)), np.empty((0, 3, 3))
+        constant, own = {"body": NOTHING, "world": NOTHING}, list[Torque]()
+        if body.motor is not None:
+            rotor = _each_time(body.motor.at, t, window)
+            wheel = self.reaction * (rotor @ body.inverse.T)
+        elif body.rotor_momentum is not None:
+            rotor = np.repeat(body.rotor_momentum[None], len(t), axis=0)
+        if torque is not None and torque.of_attitude:
+            own.append(_own_torque(torque, t, window))
+        elif torque is not None:
+            constant[torque.frame] = _each_time(torque.at, t, window)
+        if of_time and of_time.of_attitude:
+            own.append(_own_damping(damping, t, window))
+        elif damping is not None:
+            resistance = _each_time(damping.at, t, window)
+        if isinstance(scene.potential, Turning) and self.law is not None:
+            half = scene.potential.orbit.rate / 2 * t[:, None]
+            back = np.concatenate([np.cos(half), -np.sin(half) * scene.potential.orbit.normal_W], axis=1)
+        elif scene.potential is not None and self.law is None:
+            own.append(_own_field(scene.potential, t, self.field))
+        loads = picard.AtTimes(rotor, wheel, back, constant["body"], constant["world"], resistance, np.empty((0, 0, 3)))
+        return Derivative(self, loads, own)
 
-        def load(y: Array, w: Array) -> Array:
-            rates, out = np.moveaxis(w, 0, -1), np.zeros((*w.shape[1:], 3))
-            R = _matrix(y) if turned else np.eye(3)
-            times = np.broadcast_to(t, rates.shape[:-1])
-            if field is not None:
-                out += _column(self.field)[..., None] * field(R)
-            if torque is not None:
-                value = M if M is not None else _each(torque.at, times, R, window)
-                out += value if torque.frame == "body" else (np.broadcast_to(value, rates.shape)[..., None, :] @ R)[..., 0, :]
-            if damping is not None:
-                value = D if D is not None else _each(damping.at, times, R, window)
-                out -= (value @ rates[..., None])[..., 0]
-            return np.moveaxis(out, -1, 0)
+    @cached_property
+    def law(self) -> Any:
+        """The law of the field for kernels, in the axes in which the field is fixed; None without one."""
+        fixed = static_part(self.scene.potential)
+        return fixed.kernel_field(np.eye(3)) if isinstance(fixed, FieldPotential) else None
 
-        return load
+    def terms(self, bodies: int) -> picard.Terms:
+        """Return the terms of the equations of a number of states."""
+        J, inverse = (np.ascontiguousarray(x) for x in (self.scene.body.inertia, self.scene.body.inverse))
+        mode, tensor = picard.HALF_TURNED if self.half_turned else picard.USUAL, J
+        if self.fixed is not None:
+            mode, tensor = picard.FIXED, np.ascontiguousarray(self.fixed)
+            inverse = np.linalg.inv(tensor).astype(float)
+        spinning, side = J if self.spinning is None else np.ascontiguousarray(self.spinning), -1.0 if self.left else 1.0
+        factors = np.empty((bodies, 4))
+        for i, factor in enumerate((self.gyroscopic, self.field, self.damping, self.turn)):
+            factors[:, i] = factor
+        return picard.Terms(J, inverse, spinning, tensor, mode, side, factors)
 
     @property
     def steady(self) -> bool:
@@ -177,7 +154,7 @@ class Equations:
                 b = min(after, end) if min(after, end) - b < 0.01 * length else b  # no tiny stretch at the end
                 half = (b - a) / 2
                 try:
-                    Y, sweeps = _sweep(self.at(a + half * (_X + 1), (before, after)), y, half, self.tolerance)
+                    Y, sweeps = self.at(a + half * (_X + 1), (before, after)).sweep(y, half, self.tolerance)
                 except (TorqueFailed, PotentialFailed):
                     break
                 series = Y @ _COEFFICIENTS.T
@@ -189,7 +166,7 @@ class Equations:
                     if not np.isfinite(Y).all():
                         break
                 made.ends.append(b)
-                made.series.append(series)
+                made.series.append(np.moveaxis(series, 0, -1))
                 y, a = Y[..., -1], b
                 y[:4] /= np.sqrt((y[:4] * y[:4]).sum(axis=0))
                 before = breaks.pop(0) if a == after else before
@@ -208,7 +185,7 @@ class Equations:
 
 @dataclass(frozen=True, eq=False)
 class Flow:
-    """A motion as Chebyshev series (7, B, NODES) between `ends`, s, from the states `first` (7, B) on."""
+    """A motion as Chebyshev series (B, NODES, 7) between `ends`, s, from the states `first` (7, B) on."""
 
     equations: Equations
     ends: list[float]
@@ -217,75 +194,112 @@ class Flow:
 
     def at(self, t: Array) -> tuple[Array, Array]:
         """Return attitudes (B, n, 3, 3) and rates (B, n, 3) at times (n,), s, in any order; nan outside of the motion."""
-        out = np.full((7, self.first.shape[1], len(t)), np.nan)
-        out[:, :, t == self.ends[0]] = self.first[:, :, None]
-        place = np.searchsorted(self.ends, t, side="left")
-        for k, (a, b, series) in enumerate(zip(self.ends[:-1], self.ends[1:], self.series, strict=True), 1):
-            if (some := place == k).any():
-                out[:, :, some] = chebyshev.chebval((t[some] - a) / ((b - a) / 2) - 1, np.moveaxis(series, -1, 0))
-        with np.errstate(all="ignore"):
-            return self.equations.states(out, t)
+        return self._sample(t[None], self.first.shape[1])
 
     def at_own_times(self, t: Array) -> tuple[Array, Array]:
         """Return the motion of each state, or of the only one, at its own times (B, n), s."""
-        own = np.arange(len(t)) % self.first.shape[1]
-        flows = [Flow(self.equations, self.ends, [x[:, [b]] for x in self.series], self.first[:, [b]]) for b in own.tolist()]
-        made = [flow.at(np.clip(times, self.ends[0], None)) for flow, times in zip(flows, t, strict=True)]
-        return np.concatenate([R for R, _ in made]), np.concatenate([w for _, w in made])
+        return self._sample(np.clip(t, self.ends[0], None), len(t))
+
+    def _sample(self, t: Array, bodies: int) -> tuple[Array, Array]:
+        R, w = np.empty((bodies, t.shape[1], 3, 3)), np.empty((bodies, t.shape[1], 3))
+        series = np.array(self.series).reshape(-1, self.first.shape[1], NODES, 7)
+        wheel = np.empty((0, 0, 3))
+        if self.equations.scene.body.motor is not None:
+            wheel = np.stack([self.equations.wheel(times).T for times in t])
+        picard.sample(np.array(self.ends), series, np.ascontiguousarray(self.first), np.ascontiguousarray(t), wheel, R, w)
+        return R, w
 
 
-def _sweep(slope: Callable[[Array], Array], y: Array, half: float, tolerance: float) -> tuple[Array, int]:
-    """Return the states (7, B, NODES) of a stretch from its first ones (7, B), and the number of iterations.
+def integrate_rates(rates: Callable[[Array], Array], ends: Array, t: Array) -> Array:
+    """Return attitudes (n, 3, 3) at times (n,), s, that begin at the identity and have given rates, rad/s, body axes.
 
-    The number is `SWEEPS` if they have not converged before.
+    `rates` returns rates (..., 3) at times (...). They are smooth between `ends` (m,), s, the first of which is the start.
+    All stretches are integrated at once by Picard's iteration, from the identity each, and then joined.
     """
-    Y, last, size = np.repeat(y[:, :, None], NODES, axis=2), math.inf, np.abs(y).max() or 1.0
-    for sweep in range(1, SWEEPS):
-        new = y[:, :, None] + half * (slope(Y) @ _INTEGRAL.T)
-        change, Y = float(np.abs(new - Y).max()) / size, new
-        # Converged, or no longer converging near round-off, or diverged.
-        if change < tolerance or (change < 1e-13 and change > 0.5 * last) or not change < 1e30:
-            return Y, sweep
-        last = change
-    return Y, SWEEPS
+    half = np.diff(ends)[:, None] / 2
+    w = np.moveaxis(rates(ends[:-1, None] + half * (_X + 1)), -1, 0) / 2
+    q = np.zeros((4, *w.shape[1:]))
+    q[0] = 1.0
+    for _ in range(SWEEPS):
+        a, v = q[0], q[1:]
+        slope = np.concatenate([-(v * w).sum(axis=0)[None], a * w + cross(v, w)])
+        before, q = q, half * (slope @ _INTEGRAL_T)
+        q[0] += 1.0
+        if np.abs(q - before).max() < _EPS:
+            break
+    joined = [np.eye(3)]
+    for turn in _matrix(q[..., -1]):
+        joined.append(joined[-1] @ turn)
+    place = np.clip(np.searchsorted(ends, t, side="left") - 1, 0, len(half) - 1)
+    series, x = np.moveaxis(q @ _COEFFICIENTS.T, -1, 0)[:, :, place], (t - ends[place]) / half[place, 0] - 1
+    return np.array(joined)[place] @ _matrix(chebyshev.chebval(x, series, tensor=False))
 
 
-def _field(potential: Any, t: Array) -> Callable[[Array], Array]:
-    """Return the torque (..., n, 3) of a field, N m, body axes, as a function of attitudes (..., n, 3, 3) at times (n,), s.
+@dataclass(frozen=True, eq=False)
+class Derivative:
+    """The derivative of states (7, B, n) at n times. `own` are torques of the state."""
 
-    The derivative of a compiled field is c d', and its torque (R' c) x d in axes in which the field is fixed.
-    """
-    fixed = static_part(potential)
-    if not isinstance(fixed, FieldPotential):
-        return lambda R: (torque_W(potential, R, np.broadcast_to(t, R.shape[:-2]))[..., None, :] @ R)[..., 0, :]
-    law, axes = fixed.kernel_field(np.eye(3)), None if fixed is potential else np.swapaxes(potential.orbit.R_WO(t), 1, 2)
+    equations: Equations
+    loads: picard.AtTimes
+    own: list[Torque]
+    terms: dict[int, picard.Terms] = field(default_factory=dict)
 
-    def torque(R: Array) -> Array:
-        R = R if axes is None else axes @ R
-        columns = [[R[..., i, j] for i in range(3)] for j in range(3)]
-        c, d = law.finite_derivative(columns, columns)
-        return np.moveaxis(cross([sum(r * x for r, x in zip(column, c, strict=True)) for column in columns], d), 0, -1)
+    def __call__(self, y: Array) -> Array:
+        out, y = np.empty(y.shape), np.ascontiguousarray(y)
+        if y.shape[1] not in self.terms:
+            self.terms[y.shape[1]] = self.equations.terms(y.shape[1])
+        picard.slopes(self.equations.law, self.terms[y.shape[1]], self._with_own(y), y, out)
+        return out
 
-    return torque
+    def sweep(self, y: Array, half: float, tolerance: float) -> tuple[Array, int]:
+        """Return the states (7, B, NODES) of a stretch from its first ones (7, B), and the number of iterations.
+
+        The number is `SWEEPS` if they have not converged before.
+        """
+        Y, terms, y = np.repeat(y[:, :, None], NODES, axis=2), self.equations.terms(y.shape[1]), np.ascontiguousarray(y)
+        if not self.own:
+            return Y, picard.sweep(self.equations.law, terms, self.loads, y, Y, half, tolerance, _INTEGRAL_T, SWEEPS)[0]
+        last = math.inf
+        for number in range(1, SWEEPS):  # functions of Python between two iterations
+            _, change = picard.sweep(self.equations.law, terms, self._with_own(Y), y, Y, half, 0.0, _INTEGRAL_T, 2)
+            if change < tolerance or (change < 1e-13 and change > 0.5 * last) or not change < 1e30:
+                return Y, number
+            last = change
+        return Y, SWEEPS
+
+    def _with_own(self, y: Array) -> picard.AtTimes:
+        if not self.own:
+            return self.loads
+        R, w = _matrix(y), np.moveaxis(y[4:], 0, -1)
+        w = w - self.loads.wheel if len(self.loads.wheel) else w
+        return self.loads._replace(own=np.ascontiguousarray(sum(torque(R, w) for torque in self.own)))
+
+
+def _each_time(value: Callable[..., Array], t: Array, window: Window) -> Array:
+    """Return the values (n, ...) of a load at times (n,), s."""
+    return np.array([value(time, None, window) for time in t.tolist()])
+
+
+def _own_torque(torque: Any, t: Array, window: Window) -> Torque:
+    def own(R: Array, w: Array) -> Array:
+        value = _each(torque.at, np.broadcast_to(t, w.shape[:-1]), R, window)
+        return value if torque.frame == "body" else (value[..., None, :] @ R)[..., 0, :]
+
+    return own
+
+
+def _own_damping(damping: Any, t: Array, window: Window) -> Torque:
+    return lambda R, w: -(_each(damping.at, np.broadcast_to(t, w.shape[:-1]), R, window) @ w[..., None])[..., 0]
+
+
+def _own_field(potential: Any, t: Array, factor: float | Array) -> Torque:
+    strength = np.asarray(factor, float).reshape(-1, 1, 1)
+    return lambda R, w: strength * (torque_W(potential, R, np.broadcast_to(t, R.shape[:-2]))[..., None, :] @ R)[..., 0, :]
 
 
 def _matrix(y: Array) -> Array:
     """Return attitudes (..., 3, 3) of states (7, ...), whose quaternions have any norm."""
     return from_quaternion(np.moveaxis(y[:4] / np.sqrt((y[:4] * y[:4]).sum(axis=0)), 0, -1))
-
-
-def _turn(R: Array, v: Array) -> Array:
-    """Return vectors (3, ...) turned by matrices (..., 3, 3)."""
-    return np.moveaxis((R @ np.moveaxis(v, 0, -1)[..., None])[..., 0], -1, 0)
-
-
-def _column(value: float | Array) -> Array:
-    """Return a number, or numbers (B,) of each motion as (B, 1)."""
-    return np.asarray(value, float).reshape(-1, 1) if np.ndim(value) else np.asarray(value, float)
-
-
-def _apply(matrix: Array, v: Array) -> Array:
-    return (matrix @ v.reshape(3, -1)).reshape(v.shape)
 
 
 def cross(a: Any, b: Any) -> Array:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import fields
-from functools import partial
+from dataclasses import fields, replace
+from functools import cached_property, partial
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from conservative.attitude import Array
 from conservative.errors import BadInput
@@ -17,14 +18,14 @@ from conservative.scene import Scene
 
 from .compare import Compared, Solution, exact
 from .explanation import Trial
-from .mistakes.attitudes import Rule, integrate
+from .mistakes.attitudes import BIASED, BODY, Drift, Rule, integrate
 from .mistakes.equations import EquationsMistake
 from .mistakes.habits import Habit
 from .mistakes.mistake import Mistake
 from .mistakes.readings import ATTITUDES, RATES, Reading
 from .mistakes.scenes import SceneMistake
 from .mistakes.times import Time
-from .solution import Equations, truth
+from .solution import ANGLE, Equations, integrate_rates, truth
 
 FASTEST = 1.1
 """Largest factor of times."""
@@ -179,6 +180,58 @@ def by_rule(rule: Rule, parts: int) -> Trial:
         return motion
 
     return Trial((rule,), build)
+
+
+def by_drift(drift: Drift) -> Trial:
+    """Return the trial of attitudes that turn away from the exact motion at a constant rate."""
+
+    def build(case: Compared) -> Solution | None:
+        if case.data[0] is None:
+            return None
+        motion = exact(case)
+
+        def drifting(R: Array, w: Array, p: Array, n: int) -> tuple[Array, Array]:
+            turned, rates = motion(R, w, p, n)
+            some = case.take(slice(0, n))
+            return np.stack([Drifting(some, *each)(drift, row) for *each, row in zip(R, w, turned, p, strict=True)]), rates
+
+        return drifting
+
+    return Trial((drift,), build, drift.numbers)
+
+
+class Drifting:
+    """Attitudes that drift against a motion of a case: the motion from R0, w0 has the attitudes R (n, 3, 3)."""
+
+    def __init__(self, case: Compared, R0: Array, w0: Array, R: Array) -> None:
+        self.case, self.start, self.R = case, (R0, w0), R
+
+    @cached_property
+    def between(self) -> tuple[Array, Callable[[Array], Array]]:
+        """The ends of stretches, s, and the attitudes at times between them."""
+        case, end = self.case, float(self.case.t[-1])
+        breaks = [time for time in case.scene.smoothness(end).breaks.tolist() if case.start < time < end]
+        count = 2 + int((end - case.start) * case.scale / ANGLE)
+        known: dict[int, Array] = {}  # the same times for each rate
+
+        def attitudes(times: Array) -> Array:
+            if not known:
+                flat, place = np.unique(times, return_inverse=True)
+                at = replace(case, t=flat, data=(None, None))
+                turned = exact(at)(self.start[0][None], self.start[1][None], np.zeros((1, 0)), len(flat))[0][0]
+                known[0] = turned[place.reshape(times.shape)]
+            return known[0]
+
+        return np.unique([*np.linspace(case.start, end, count), *breaks]), attitudes
+
+    def __call__(self, drift: Drift, numbers: Array) -> Array:
+        """Return the attitudes (n, 3, 3) that drift."""
+        rate, after = drift.rate(numbers), self.case.t - self.case.start
+        if drift.about == BIASED:  # (P R)' = P R [w + b] holds for P' = P [R b], the turn of the world
+            ends, attitudes = self.between
+            return integrate_rates(lambda times: attitudes(times) @ rate, ends, self.case.t) @ self.R
+        away = Rotation.from_rotvec(after[:, None] * rate).as_matrix()
+        return self.R @ away if drift.about == BODY else away @ self.R
 
 
 def by_habit(habit: Habit, step: float | None) -> Trial:

@@ -6,7 +6,7 @@ times       times to times of attitudes and of rates
 scenes      a scene to the one that was simulated
 equations   a scene to other equations of motion
 steps       an integrator: the state after a step
-attitudes   rates to the matrices that turn attitudes
+attitudes   rates to the matrices that turn attitudes, or a rate at which attitudes drift
 habits      the state after a step to the one that is kept, or the body stands still
 rows        right rows to the ones that were written
 bodies      a mass distribution to another one
@@ -19,12 +19,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
-from .attitudes import RULES
+from .attitudes import DRIFTS, RULES
 from .bodies import FITTED, LOADED
 from .equations import EQUATIONS
 from .habits import HABITS, OTHER_ROWS, ROWS, STANDSTILLS
 from .mistake import Mistake
 from .readings import READINGS
+from .samples import RESAMPLED
 from .scenes import BODIES, SCENES
 from .steps import INTEGRATORS
 from .times import ROW_TIMES, TIMES
@@ -41,8 +42,8 @@ def table_of(mistakes: Iterable[Mistake]) -> Mapping[str, Mistake]:
 
 
 BY_KEY = table_of([
-    *READINGS, *TIMES, *ROW_TIMES, *SCENES, *BODIES, *EQUATIONS, *INTEGRATORS, *RULES,
-    *HABITS, *STANDSTILLS, *ROWS, *OTHER_ROWS, *FITTED,
+    *READINGS, *TIMES, *ROW_TIMES, *SCENES, *BODIES, *EQUATIONS, *INTEGRATORS, *RULES, *DRIFTS,
+    *HABITS, *STANDSTILLS, *ROWS, *OTHER_ROWS, *RESAMPLED, *FITTED,
     *(mistake for mistake in LOADED if mistake.key not in {scene_mistake.key for scene_mistake in SCENES}),
 ])  # fmt: skip
 """All mistakes by key. Dropped products of inertia are in `SCENES` and in `LOADED`: one mistake with an effect on each kind."""

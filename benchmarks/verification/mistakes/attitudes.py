@@ -1,4 +1,4 @@
-"""Attitudes: they are integrated by a rule of low order from rates that are right."""
+"""Attitudes: they are not the integral of rates that are right. A rule of low order made them, or they drift."""
 
 from __future__ import annotations
 
@@ -26,6 +26,27 @@ class Rule(Mistake):
     kind: ClassVar[str] = "attitudes"
     matrices: Effect
     world: bool = False
+
+
+@dataclass(frozen=True)
+class Drift(Mistake):
+    """Attitudes that turn away from the right ones at a constant rate, beginning at the start.
+
+    `about` says in which axes the rate is constant: those of the body, those of the world, or those of the rates, to which it
+    is added. With an `axis` the only number is the rate about it.
+    """
+
+    kind: ClassVar[str] = "attitudes"
+    about: str
+    axis: tuple[float, float, float] | None = None
+
+    def rate(self, numbers: Array) -> Array:
+        """Return the rate (3,), rad/s, for numbers."""
+        return np.asarray(numbers, float) if self.axis is None else numbers[0] * np.array(self.axis)
+
+
+BODY, WORLD, BIASED = "body", "world", "rates"
+"""Axes in which the rate of a drift is constant."""
 
 
 def _linear(w: Array, h: Array) -> Array:
@@ -104,6 +125,37 @@ def _rule(update: str, rates: str, world: bool) -> Rule:
 
 RULES = tuple(
     _rule(update, rates, world) for update in UPDATES for rates in RATES for world in (False, True)[: 1 + (update in IN_WORLD)]
+)
+
+
+_DRIFT = tuple(Number(f"drift_{i}", unit="rad/s") for i in (1, 2, 3))
+_AT = "({drift_1:.4g}, {drift_2:.4g}, {drift_3:.4g}) rad/s"
+DRIFTS = (
+    Drift(
+        "heading drift",
+        "The rates are right, but the attitudes drift about the vertical axis by {drift:.4g} rad/s",
+        WORLD,
+        (0.0, 0.0, 1.0),
+        numbers=(Number("drift", unit="rad/s"),),
+    ),
+    Drift(
+        "drift in body axes",
+        f"The rates are right, but the attitudes turn away from them by {_AT} about an axis of the body",
+        BODY,
+        numbers=_DRIFT,
+    ),
+    Drift(
+        "drift in world axes",
+        f"The rates are right, but the attitudes turn away from them by {_AT} about an axis of the world",
+        WORLD,
+        numbers=_DRIFT,
+    ),
+    Drift(
+        "drift of a bias",
+        f"The rates are right, but the attitudes are the integral of rates with a bias of {_AT}",
+        BIASED,
+        numbers=_DRIFT,
+    ),
 )
 
 

@@ -204,6 +204,25 @@ READINGS = (
         numbers=TURN,
     ),
     Reading(
+        "turned attitudes",
+        "The rates are right, but the attitudes belong to axes that are turned in the body by "
+        "({turn_1:.5g}, {turn_2:.5g}, {turn_3:.5g}) rad",
+        attitude(lambda R, *turn: R @ Rotation.from_rotvec(turn).as_matrix().T),
+        attitude(lambda R, *turn: R @ Rotation.from_rotvec(turn).as_matrix()),
+        ATTITUDES,
+        both=True,
+        numbers=TURN,
+    ),
+    Reading(
+        "turned world",
+        "The attitudes are relative to a world that is turned by ({turn_1:.5g}, {turn_2:.5g}, {turn_3:.5g}) rad",
+        attitude(lambda R, *turn: Rotation.from_rotvec(turn).as_matrix() @ R),
+        attitude(lambda R, *turn: Rotation.from_rotvec(turn).as_matrix().T @ R),
+        ATTITUDES,
+        of_world=True,
+        numbers=TURN,
+    ),
+    Reading(
         "body axes",
         "The body axes of the file are not the axes of the body: turn them by ({turn_1:.5g}, {turn_2:.5g}, {turn_3:.5g}) rad",
         lambda R, w, *turn: _body_axes(R, w, Rotation.from_rotvec(turn).as_matrix().T),

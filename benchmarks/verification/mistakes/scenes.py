@@ -94,7 +94,10 @@ def _orbit(scene: Scene, factor: float) -> Scene | None:
     field = scene.potential
     if not isinstance(field, Turning):
         return None
-    return changed(scene, potential=replace(field, orbit=Orbit(field.orbit.rate * factor, field.orbit.normal_W)))
+    fixed: Any = field.potential
+    if getattr(fixed, "rate", None) == field.orbit.rate:  # the gradient of a circular orbit has the rate of the orbit
+        fixed = replace(fixed, rate=fixed.rate * factor)
+    return changed(scene, potential=Turning(fixed, Orbit(field.orbit.rate * factor, field.orbit.normal_W)))
 
 
 def _products(scene: Scene, factor: float) -> Scene | None:

@@ -56,6 +56,12 @@ TIMES = (
         numbers=(Number("shift", unit="s"),),
     ),
     Time(
+        "time scale",
+        "The time is scaled: the file is {rate:+.3g} s per second too fast",
+        lambda t, step, rate: _both(t * (1 + rate)),
+        numbers=(Number("rate"),),
+    ),
+    Time(
         "phase drift",
         "The time is scaled: the file is {rate:+.3g} s per second too fast, and {shift:+.3g} s ahead",
         lambda t, step, shift, rate: _both(t * (1 + rate) + shift),

@@ -26,6 +26,14 @@ def convert(values: Array, layout: Layout, options: Options) -> tuple[Array, Sta
     return values[:, 0], (R, w), unit_errors
 
 
+def find_flips(values: Array, layout: Layout) -> Array | None:
+    """Return which rows (n,) have a quaternion of the other sign than the row before; None without quaternions."""
+    if layout.attitude != "quaternion":
+        return None
+    q = values[:, -4:]
+    return np.append(False, (q[1:] * q[:-1]).sum(axis=1) < 0)
+
+
 def to_matrices(x: Array, kind: str | None, options: Options) -> tuple[Array | None, Array | None]:
     """Return matrices (n, 3, 3) and `unit_errors` (n,) of attitudes of a kind; None without them."""
     if kind is None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from conservative.attitude import Array, from_quaternion, hat, to_quaternion
+from conservative.attitude import Array, angle_between, hat
 from conservative.errors import BadInput
 from conservative.features import IN_TIME
 from conservative.scene import Scene
@@ -18,6 +18,7 @@ from ..compare import (
     FEWEST_FOR_NOISE,
     FLOOR,
     HOPELESS,
+    MOST_NOISE,
     NUMERICAL,
     SIGMAS,
     TINY,
@@ -32,9 +33,8 @@ from ..compare import (
 )
 from ..solution import States, has_closed_form, truth
 from .table import Recording
+from .units import no_unit
 
-MOST_NOISE = 0.05
-"""Largest noise, rad or relative to the largest rate. Larger differences of rows are motion."""
 ROUND_OFF = 2e-15
 """Error of an exact motion, rad."""
 ROWS_OF_NOISE = 4000
@@ -43,6 +43,14 @@ CLEARLY = 2.0
 """Smallest median error of single rows that are off, in allowed errors."""
 MOST_PARTS = 200
 """Largest number of parts of a recording that are compared one after another."""
+ROWS_OF_READINGS = 200
+"""Largest number of rows by which readings of a file are chosen."""
+FITS = 0.1
+"""Largest mean error of a reading in its unit, rad and relative to the largest rate, and relative to other units."""
+CLEAR = 1e-3
+"""Smallest mean error of readings in other units. A body at rest and one that turns uniformly fit in all."""
+STARTS = 1e-3
+"""Largest difference of a first row from the start of a scene, rad and relative."""
 QUARTER = math.pi / 2
 """Turn from row to row, rad, from which differences of a motion do not become smaller with their order."""
 
@@ -69,6 +77,53 @@ def prepare(scene: Scene, recording: Recording, from_row: bool, error: float | N
 
     Raises `BadInput` for times at which the scene has no motion.
     """
+    recording, notes = _settle(scene, recording, from_row)
+    scene, t, start = _begin(scene, recording, from_row)
+    (R, w), first = recording.data, float(recording.t[0])
+    if first != 0 and not from_row:
+        notes.append(f"The first row is compared with the motion of the scene at {first:g} s.")
+    rates = np.linalg.norm(scene.w_WB_B0[None] if w is None else w, axis=1)
+    scale = largest = float(rates.max())
+    if largest > 10 * np.linalg.norm(scene.w_WB_B0) > 0:  # a motion that diverges is compared at the scale of the exact one
+        scale = min(largest, float(np.linalg.norm(np.vstack([truth(scene, start, t)[1], scene.w_WB_B0]), axis=1).max()))
+    if scale == 0 and w is None and R is not None:
+        turned = Rotation.from_matrix(np.swapaxes(R[:-1], 1, 2) @ R[1:]).as_rotvec()
+        scale = float((np.linalg.norm(turned, axis=1) / np.diff(t)).max())
+    scale = scale or 1.0
+    rounded = _rounded(recording, t, rates, scale)
+    noise, resolved = _find_noise(scene, recording, start, float(t[0]) - first, scale, allow(rounded).errors)
+    allowed = allow(rounded, noise, error)
+    have = np.array([R is not None, w is not None])
+    unknown = have & np.logical_not(resolved) & (len(t) >= FEWEST_FOR_NOISE and error is None)
+    inexact = from_row and bool((rounded > 1e-13).any() or (noise > 1e-11).any() or unknown.any())
+    free = [*range(3)] * (R is not None) + [*range(3, 6)] * (w is not None)
+    case = Compared(
+        scene,
+        t,
+        recording.data,
+        start,
+        scale,
+        allowed.errors,
+        allowed.noise,
+        tuple(free) if inexact else (),
+        rounded=tuple(allowed.rounded.tolist()),
+        flipped=recording.flipped,
+        open=(bool(unknown[0]), bool(unknown[1])),
+    )
+    if any(case.open) and (case.error.max(axis=1) > case.allowed).any() and case.turned <= NUMERICAL:
+        # The rows alone do not show their noise. The exact motion may leave nothing else.
+        _, _, made = case.fit(exact(case), np.zeros(0), np.zeros(0))
+        white = case.leaves_noise(*made)
+        if white.any() and (white | (case.errors(*made).max(axis=1) <= case.allowed)).all():
+            left = np.sqrt((case.errors(*made) ** 2).mean(axis=1) / 3)
+            noise = np.where(white, left, noise)
+            allowed, resolved = allow(rounded, noise, error), np.logical_or(resolved, white)
+            case = replace(case, allowed=allowed.errors, noise=allowed.noise, open=(False, False))
+    return Rows(recording, case, allowed, noise, resolved, notes)
+
+
+def _begin(scene: Scene, recording: Recording, from_row: bool) -> tuple[Scene, Array, float]:
+    """Return the scene that starts as a recording does, the times of its rows, and the time of its start."""
     (R, w), t, first = recording.data, recording.t, float(recording.t[0])
     timed = bool(scene.loads or scene.features & IN_TIME)
     if first < 0 and (timed or not from_row):
@@ -81,57 +136,58 @@ def prepare(scene: Scene, recording: Recording, from_row: bool, error: float | N
             raise BadInput("run", got, f"rows within the table (--until), or {short.allowed}") from None
     elif from_row:  # sums of steps and a large time would lose digits
         t = t - first
-    notes = []
-    if first != 0 and not from_row:
-        notes.append(f"The first row is compared with the motion of the scene at {first:g} s.")
     if from_row:
         changes = {name: x[0] for name, x in (("R_WB0", R), ("w_WB_B0", w)) if x is not None}
         if len(changes) == 1 and timed and 0 < first <= scene.t_end:
             Rs, ws = truth(scene, 0.0, np.array([0.0, first]))
             changes = {"R_WB0": Rs[1], "w_WB_B0": ws[1]} | changes
         scene = scene.rename(scene.name, **changes)
-    start = float(t[0]) if from_row else 0.0
-    if not recording.order_known and R is not None:
-        recording, scene = _choose_order(scene, recording, t, start)
-        R = recording.data[0]
-        notes.append(f"The order of the quaternions is not named; {recording.options.quaternion} fits better.")
-    rates = np.linalg.norm(scene.w_WB_B0[None] if w is None else w, axis=1)
-    scale = largest = float(rates.max())
-    if largest > 10 * np.linalg.norm(scene.w_WB_B0) > 0:  # a motion that diverges is compared at the scale of the exact one
-        scale = min(largest, float(np.linalg.norm(np.vstack([truth(scene, start, t)[1], scene.w_WB_B0]), axis=1).max()))
-    if scale == 0 and w is None and R is not None:
-        turned = Rotation.from_matrix(np.swapaxes(R[:-1], 1, 2) @ R[1:]).as_rotvec()
-        scale = float((np.linalg.norm(turned, axis=1) / np.diff(t)).max())
-    scale = scale or 1.0
-    rounded = _rounded(recording, t, rates, scale)
-    noise, resolved = _find_noise(scene, recording, start, float(t[0]) - first, scale, allow(rounded).errors)
-    allowed = allow(rounded, noise, error)
-    inexact = from_row and bool((rounded > 1e-13).any() or (noise > 1e-11).any())
-    free = [*range(3)] * (R is not None) + [*range(3, 6)] * (w is not None)
-    case = Compared(
-        scene,
-        t,
-        recording.data,
-        start,
-        scale,
-        allowed.errors,
-        allowed.noise,
-        tuple(free) if inexact else (),
-        rounded=tuple(allowed.rounded.tolist()),
-    )
-    return Rows(recording, case, allowed, noise, resolved, notes)
+    return scene, t, float(t[0]) if from_row else 0.0
 
 
-def _choose_order(scene: Scene, recording: Recording, t: Array, start: float) -> tuple[Recording, Scene]:
-    """Return the recording with the order of quaternions that fits the exact motion better, and the scene of that order."""
+def _settle(scene: Scene, recording: Recording, from_row: bool) -> tuple[Recording, list[str]]:
+    """Return the reading of a recording that fits the motion of the scene, where no name has the order or the unit, and notes.
+
+    A unit is the only one in which the first row is the start of the scene, or the only one in which the motion fits. An order
+    is the one that fits better. Raises `BadInput` if the data do not decide the unit.
+    """
+    readings, notes = list(recording.readings), list[str]()
+    if not readings:
+        return recording, notes
+    kinds, why = readings[0].layout.open, "is the first row the start of the scene"
+    started = [reading for reading in readings if _starts(scene, reading)]
+    if kinds and started and all(reading.layout.used == started[0].layout.used for reading in started):
+        readings = [reading for reading in readings if reading.layout.used == started[0].layout.used]
+    elif kinds:
+        why = "does the motion fit the scene"
+    ranked = sorted(((_misfit(scene, reading, from_row), i) for i, reading in enumerate(readings)))
+    least, chosen = ranked[0][0], readings[ranked[0][1]]
+    others = [misfit for misfit, i in ranked if readings[i].layout.used != chosen.layout.used]
+    if others and not (least <= FITS * min(1.0, *others) and min(others) > CLEAR):
+        raise no_unit(recording.path, [name for kind in kinds for name in chosen.layout.used[kind]])
+    for kind in kinds:
+        names = chosen.layout.used[kind]
+        notes.append(f"{', '.join(names)}: read in {'rad' if 1.0 in names.values() else 'deg'}, because only so {why}.")
+    if len({reading.options.quaternion for reading in readings}) > 1:
+        notes.append(f"The order of the quaternions is not named; {chosen.options.quaternion} fits better.")
+    return replace(chosen, readings=()), notes
+
+
+def _misfit(scene: Scene, recording: Recording, from_row: bool) -> float:
+    """Return the mean error of rows, rad and relative to their largest rate."""
+    scene, t, start = _begin(scene, recording, from_row)
+    some, w, usual = np.unique(np.linspace(0, len(t) - 1, ROWS_OF_READINGS).astype(int)), recording.data[1], allow()
+    scale = 1.0 if w is None else float(np.abs(w).max()) or 1.0
+    case = Compared(scene, t[some], take_rows(recording.data, some), start, scale, usual.errors, usual.noise)
+    return float(case.error.max(axis=0).mean())
+
+
+def _starts(scene: Scene, recording: Recording) -> bool:
+    """Return whether the first row is the start of the scene, up to its digits."""
     R, w = recording.data
-    assert R is not None
-    usual = allow()
-    first = Compared(scene, t, (R, w), start, 1.0, usual.errors, usual.noise)
-    other = first.read(from_quaternion(np.roll(to_quaternion(R), 1, axis=1)), w)
-    case, order = min((first, "wxyz"), (other, "xyzw"), key=lambda candidate: float(candidate[0].error.mean()))
-    options = replace(recording.options, quaternion=order)
-    return replace(recording, data=case.data, order_known=True, options=options), case.scene
+    size = float(np.linalg.norm(scene.w_WB_B0))
+    turned = R is None or angle_between(R[:1], scene.R_WB0[None])[0] <= STARTS
+    return bool(turned and (w is None or (size > 0 and np.linalg.norm(w[0] - scene.w_WB_B0) <= STARTS * size)))
 
 
 def _rounded(recording: Recording, t: Array, rates: Array, scale: float) -> Array:
@@ -167,7 +223,8 @@ def _find_noise(
         (R, w), (a, b) = truth(scene, start, t[:n] + shift), take_rows(data, slice(0, n))
         rest: States = None if a is None else np.swapaxes(R, 1, 2) @ a, None if b is None else b - w
         if all(x is None or np.isfinite(x).all() for x in (*rest, R, w)):
-            motion, other = estimate_noise(t[:n], (R, w))[0], estimate_noise(t[:n], rest)
+            moving = w, np.gradient(w, t[:n], axis=0)
+            motion, other = estimate_noise(t[:n], (R, w))[0], estimate_noise(t[:n], rest, moving)
             slow = float(np.median(np.diff(t))) * scale < QUARTER
             # The estimate from the exact motion contains no noise. An estimate that is clearly larger is noise.
             resolved &= (motion < 0.3 * noise) | (noise < TINY)

@@ -27,7 +27,7 @@ def diagnosed(scene, R, w, t=T):
 
 FAULTS = {
     "time shift": (lambda scene: late(scene, 0.02), {"shift": 0.02}),
-    "phase drift": (lambda scene: exact(scene, T * (1 + 1e-4)), {"shift": 0.0, "rate": 1e-4}),
+    "phase drift": (lambda scene: late(scene, 0.02 + 1e-4 * T), {"shift": 0.02, "rate": 1e-4}),
     "no gyroscopic term": (without, {}),
     "damping": (lambda scene: without(scene, 0.05, True), {"damping": 0.05}),
     "no gyroscopic term + damping": (lambda scene: without(scene, 0.05), {"damping": 0.05}),
@@ -55,6 +55,15 @@ def test_two_mistakes_with_the_same_rows_are_both_named():
     found = verify_recording(FREE, Recording(T, stepped(FREE, IMPLICIT, 3), rows=len(T)))
     assert found.findings[0].mistake == ""
     assert {each.name for each in found.details.explaining} == {IMPLICIT, "implicit Euler"}
+
+
+def test_a_clock_and_a_factor_of_the_rates_are_both_named_for_a_free_body():
+    """Its motion at scaled times is the motion with scaled rates. Gravity separates them."""
+    named = {
+        scene: {each.name for each in verify_recording(scene, Recording(T, rows, rows=len(T))).details.explaining}
+        for scene, rows in ((scene, exact(scene, T * (1 + 1e-4))) for scene in (FREE, HEAVY))
+    }
+    assert named == {FREE: {"time scale", "size of the rates"}, HEAVY: {"time scale"}}
 
 
 @pytest.mark.parametrize("name", sampled(["time shift", "damping", "transposed", "body axes"], 1))
