@@ -217,6 +217,7 @@ def explanations(rows: Rows) -> Iterator[tuple[str, int, Build]]:
     elapsed = t - at
     shifted: dict[str, tuple[int, Any]] = {
         "time shift": (1, lambda p: np.where(elapsed > 0, elapsed + p[0] / rows.scale, 0.0)),
+        "time scale": (1, lambda p: elapsed * (1 + p[0])),
         "phase drift": (2, lambda p: elapsed * (1 + p[1]) + p[0] / rows.scale),
     }
     for name, (numbers, times) in shifted.items():
