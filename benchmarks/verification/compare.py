@@ -270,6 +270,16 @@ class Compared:
         """The angle, rad, by which the body may have turned."""
         return float(self.t[-1] - self.start) * self.scale
 
+    @property
+    def gap(self) -> float:
+        """The angle, rad, by which the body turns from row to row."""
+        return float(np.median(np.diff(self.t))) * self.scale
+
+    @property
+    def far(self) -> bool:
+        """Whether the body turns by more from row to row than trial motions do in all."""
+        return self.gap > NUMERICAL
+
     @cached_property
     def plain(self) -> Array:
         """The errors (2, n) without a mistake: from the first row, or from a start that is fitted if it has noise."""
@@ -334,7 +344,7 @@ class Compared:
         R, w = self.evaluate(motion, numbers + small * np.vstack([0 * numbers, np.eye(len(numbers))[moved]]))
         d = (self.differences(R, w) / np.repeat(self.noise, [9, 3])).reshape(1 + len(moved), -1)
         slopes, out = (d[1:] - d[0]) / small, np.zeros(len(numbers))
-        out[moved] = np.sqrt(np.diag(np.linalg.pinv(slopes @ slopes.T)))
+        out[moved] = np.sqrt(np.maximum(np.diag(np.linalg.pinv(slopes @ slopes.T)), 0.0))
         return out
 
     def fit(self, motion: Solution, extra: Array, changed: Array, most: int = 8) -> tuple[Array, Array, tuple[Array, Array]]:

@@ -28,7 +28,8 @@ from .mistakes.scenes import PARTS as SCENE_PARTS
 from .mistakes.scenes import SCENES, SIZES, SceneMistake, with_inertia
 from .mistakes.steps import INTEGRATORS
 from .mistakes.times import DROPPED, JITTERED, TIMES
-from .solution import Equations, has_closed_form, truth
+from .resampled import find_resampled
+from .solution import Equations, has_closed_form, integrate_rates, truth
 from .trials import Drifting, by_drift, by_habit, by_rule, compose, fits, remark_on_damping
 
 FEWEST, MOST = 100, 2500
@@ -50,6 +51,8 @@ NEARLY, SMALL_SHARE, REFINED = 1e-2, 1e-6, 2
 number for slopes, and the number of such fits."""
 DRIFTING_ROWS, DRIFTING_EFFORT, MOST_FITS = 300, 30, 20
 """Rows from which a drift is fitted, the work of a fit, and the largest number of its iterations."""
+FROZEN = "frozen motion"
+"""Key of a mistake that no fitted number explains better."""
 _INERTIA = [f"inertia_{ij}" for ij in (11, 12, 13, 22, 23, 33)]
 ALL_KINDS = frozenset({"readings", "times", "scenes", "equations", "attitudes", "habits", "rows", "steps", "bodies"})
 PROGRAM_KINDS = frozenset({"readings", "times", "scenes", "equations", "attitudes", "habits"})
@@ -88,7 +91,7 @@ def diagnose(
     early = whole.first(LONGEST, FEWEST).change(effort=case.effort)
     tried, over = list[Explanation](), False
     for name, search in SEARCHES.items():
-        if not kinds & search.kinds or len(case.t) < search.least:
+        if not kinds & search.kinds or len(case.t) < search.least or (whole.far and not search.whole):
             continue
         tell(name)
         case.effort.left = max(case.effort.left, 0.0) + EFFORT * search.share  # unused work is kept
@@ -98,7 +101,8 @@ def diagnose(
             if case.effort.over:
                 over = True
                 break
-        if search.ends and any(explanation.explains for explanation in tried):
+        found = [explanation.keys for explanation in tried if explanation.explains]
+        if found and (search.ends or (FROZEN,) in found):
             break  # the searches that follow take longer and fit more numbers
     bounds = np.maximum(case.plain.max(axis=1), case.allowed)
 
@@ -114,6 +118,8 @@ def diagnose(
         tried, explaining = [replace(explanation, explains=False) for explanation in tried], []
     if not explaining:
         notes = ["The search ended before everything was tried: it takes too many trial motions."] * over
+        if whole.far:
+            notes.append("No trial motion reaches the second row, so that only units of the time are tried.")
         if (corners := len(case.scene.breaks)) > MOST_BREAKS:
             notes.append(f"Other bodies, axes and damping are not fitted: the loads have {corners} jumps and corners.")
         return Diagnosis([explanation for explanation in tried if explanation.share < HALF][:3], tried, notes)
@@ -147,7 +153,8 @@ def _separate(case: Compared, named: list[Explanation]) -> list[str]:
     """Return a note on the data that would separate several mistakes that explain a file."""
     motions = [explanation.made for explanation in named if explanation.made is not None]
     for kind, i, size, unit in (("attitudes", 0, 1.0, "rad"), ("rates", 1, case.scale, "of the largest rate")):
-        apart = max((float(np.abs(a[i] - b[i]).max()) / size for a, b in combinations(motions, 2)), default=0.0)
+        pairs = ((a[i], b[i]) for a, b in combinations(motions, 2) if len(a[i]) == len(b[i]))
+        apart = max((float(np.abs(a - b).max()) / size for a, b in pairs), default=0.0)
         if case.data[i] is None and apart > 2 * case.allowed[i]:
             return [f"Columns of {kind} would separate these: they differ by up to {apart:.2g} {unit}."]
     return ["They make the same rows. A longer file or more digits may separate them."] * (len(named) > 1)
@@ -192,7 +199,8 @@ def _readings(case: Compared, asked: _Asked) -> Explanations:
         R, w = motion(near.scene.R_WB0[None], near.scene.w_WB_B0[None], np.zeros((1, 0)), len(near.t))
         # A reading that makes the first rows much worse than they are is not tried on all rows.
         if (near.errors(R[0], w[0]) <= 2 * case.error[:, :10].max() + 10 * case.allowed.max()).all():
-            yield attempt(case, trial)
+            explanation = attempt(case, trial)
+            yield explanation if _moves(case, explanation) else None
 
 
 def _changes(case: Compared, asked: _Asked) -> Explanations:
@@ -367,6 +375,7 @@ def _attitudes(case: Compared, asked: _Asked) -> Explanations:
     made = case.exact
     if case.errors(*made)[1].max() > case.allowed[1] or not case.from_row:
         return
+    limits = {False: made[0], True: _on_the_wrong_side(case)}  # of short steps
     for rule in RULES:
         wanted, seen, explanations = [case.stride, 1], set[int](), list[Explanation]()
         while wanted and len(seen) < 8:  # each try is nearer to the best number of steps, so a few are enough
@@ -378,7 +387,7 @@ def _attitudes(case: Compared, asked: _Asked) -> Explanations:
             fine = np.append((case.t[:-1, None] + np.diff(case.t)[:, None] * np.arange(parts) / parts).ravel(), case.t[-1])
             rates = truth(case.scene, case.start, fine)[1] if parts > 1 else made[1]
             turned = integrate(rule.matrices, case.scene.R_WB0, rates, np.diff(fine), parts)
-            error, gone = turned - made[0], R - made[0]
+            error, gone = turned - limits[rule.world], R - limits[rule.world]
             small = np.linalg.norm(gone, axis=(1, 2)) < LINEAR
             ratio = float((error * gone)[small].sum() / ((error * error)[small].sum() or 1.0)) if small.sum() > 2 else 1.0
             if case.free:  # the first attitude has noise too
@@ -391,6 +400,15 @@ def _attitudes(case: Compared, asked: _Asked) -> Explanations:
             if ratio > 0:
                 wanted += [max(1, round(parts * ratio ** (-1 / order))) for order in (1, 2)]
         yield min(explanations, key=lambda explanation: explanation.share)
+
+
+def _on_the_wrong_side(case: Compared) -> Array:
+    """Return the attitudes (n, 3, 3) whose quaternions are q' = w q / 2 with the exact rates, in body axes."""
+    start, end = case.scene.R_WB0, float(case.t[-1])
+    flow = Equations(case.scene).flow(case.start, start[None], case.scene.w_WB_B0[None], end)
+    # The conjugate obeys p' = p (-w) / 2.
+    turned = integrate_rates(lambda t: -flow.at(t.ravel())[1].reshape(*t.shape, 3), np.array(flow.ends), case.t)
+    return np.swapaxes(turned, 1, 2) @ start
 
 
 def _at_fitted_rates(case: Compared) -> Compared:
@@ -519,7 +537,11 @@ def _standstill(case: Compared, mistake: Standstill) -> Explanation | None:
     going = np.flatnonzero(moved > STILL)
     k = int(going[-1]) + 1 if len(going) else 0
     rest = w is None or bool(np.abs(w[k:]).max() <= STILL * case.scale)
-    if len(case.t) - k < 3 or (w is not None and mistake.rest != (0.0 if rest else 1.0)) or (w is None and mistake.rest):
+    if (
+        len(case.t) - k < 3
+        or (w is not None and mistake.rest != (0.0 if rest else 1.0))
+        or (w is None and mistake.rest and not mistake.from_start)
+    ):
         return None
     start = _still(case)
     stays_at_start = R is not None and k == 0 and case.apart((np.broadcast_to(R[0], R.shape), start[1]), start)[0] <= STILL
@@ -925,6 +947,7 @@ SEARCHES = {
     "other equations": Search(_changes, frozenset({"scenes", "equations"}), 0.3),
     "other readings": Search(_readings, frozenset({"readings"}), 0.1, ends=True),
     "habits": Search(_habits, frozenset({"habits"}), 0.1, least=1),
+    "resampled rows": Search(lambda case, asked: find_resampled(case), frozenset({"rows"}), 0.05, ends=True, whole=True),
     "wrong rows": Search(_rows, frozenset({"rows"}), 0.01, ends=True),
     "other times": Search(_times, frozenset({"times"}), 0.1),
     "axes and sizes of rates": Search(_sensors, frozenset({"readings"}), 0.1),

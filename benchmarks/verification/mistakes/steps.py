@@ -156,8 +156,8 @@ def _buss(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array], order: in
     turn = h * w + h * h / 2 * slope + h**3 / 12 * cross(slope, w)  # w' x w has the same components in world and body axes
     if order == 3:  # w'' in world axes is w'' + w x w' in body axes
         turn = turn + h**3 / 6 * ((f(t + e, y + e * k) - f(t - e, y - e * k))[4:] / (2 * e) + cross(w, slope))
-    rotor = np.zeros(3) if f.body.rotor_momentum is None or f.body.motor else f.body.rotor_momentum
-    L = (J @ y[4:].reshape(3, -1) + rotor[:, None]).reshape(w.shape)
+    rotor = f.rotor(t)
+    L = (J @ y[4:].reshape(3, -1) + rotor).reshape(w.shape)
     L = L + h * ((J @ k[4:].reshape(3, -1)).reshape(w.shape) - cross(L, w))
     back = _rotate(np.concatenate([np.ones_like(w[:1]), 0 * w]), -turn)
     carried = _product(
@@ -165,7 +165,7 @@ def _buss(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array], order: in
     )[1:]
     new = y.copy()
     new[:4] = _rotate(y[:4], turn)
-    new[4:] = np.linalg.solve(J, carried.reshape(3, -1) - rotor[:, None]).reshape(w.shape)
+    new[4:] = np.linalg.solve(J, carried.reshape(3, -1) - rotor).reshape(w.shape)
     return new
 
 

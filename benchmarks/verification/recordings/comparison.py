@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from conservative.attitude import Array, from_quaternion, hat, to_quaternion
+from conservative.attitude import Array, angle_between, hat
 from conservative.errors import BadInput
 from conservative.features import IN_TIME
 from conservative.scene import Scene
@@ -32,6 +32,7 @@ from ..compare import (
 )
 from ..solution import States, has_closed_form, truth
 from .table import Recording
+from .units import no_unit
 
 MOST_NOISE = 0.05
 """Largest noise, rad or relative to the largest rate. Larger differences of rows are motion."""
@@ -43,6 +44,14 @@ CLEARLY = 2.0
 """Smallest median error of single rows that are off, in allowed errors."""
 MOST_PARTS = 200
 """Largest number of parts of a recording that are compared one after another."""
+ROWS_OF_READINGS = 200
+"""Largest number of rows by which readings of a file are chosen."""
+FITS = 0.1
+"""Largest mean error of a reading in its unit, rad and relative to the largest rate, and relative to other units."""
+CLEAR = 1e-3
+"""Smallest mean error of readings in other units. A body at rest and one that turns uniformly fit in all."""
+STARTS = 1e-3
+"""Largest difference of a first row from the start of a scene, rad and relative."""
 QUARTER = math.pi / 2
 """Turn from row to row, rad, from which differences of a motion do not become smaller with their order."""
 
@@ -69,28 +78,11 @@ def prepare(scene: Scene, recording: Recording, from_row: bool, error: float | N
 
     Raises `BadInput` for times at which the scene has no motion.
     """
-    (R, w), t, first = recording.data, recording.t, float(recording.t[0])
-    timed = bool(scene.loads or scene.features & IN_TIME)
-    if first < 0 and (timed or not from_row):
-        raise BadInput("run", recording.label(f"a first row at {first:g} s"), "times of the scene, from 0 on")
-    if timed:  # its loads need values in all rows
-        scene = scene.rename(scene.name, t_end=max(scene.t_end, float(t[-1])))
-    elif from_row:  # sums of steps and a large time would lose digits
-        t = t - first
-    notes = []
+    recording, notes = _settle(scene, recording, from_row)
+    scene, t, start = _begin(scene, recording, from_row)
+    (R, w), first = recording.data, float(recording.t[0])
     if first != 0 and not from_row:
         notes.append(f"The first row is compared with the motion of the scene at {first:g} s.")
-    if from_row:
-        changes = {name: x[0] for name, x in (("R_WB0", R), ("w_WB_B0", w)) if x is not None}
-        if len(changes) == 1 and timed and 0 < first <= scene.t_end:
-            Rs, ws = truth(scene, 0.0, np.array([0.0, first]))
-            changes = {"R_WB0": Rs[1], "w_WB_B0": ws[1]} | changes
-        scene = scene.rename(scene.name, **changes)
-    start = float(t[0]) if from_row else 0.0
-    if not recording.order_known and R is not None:
-        recording, scene = _choose_order(scene, recording, t, start)
-        R = recording.data[0]
-        notes.append(f"The order of the quaternions is not named; {recording.options.quaternion} fits better.")
     rates = np.linalg.norm(scene.w_WB_B0[None] if w is None else w, axis=1)
     scale = largest = float(rates.max())
     if largest > 10 * np.linalg.norm(scene.w_WB_B0) > 0:  # a motion that diverges is compared at the scale of the exact one
@@ -119,16 +111,72 @@ def prepare(scene: Scene, recording: Recording, from_row: bool, error: float | N
     return Rows(recording, case, allowed, noise, resolved, notes)
 
 
-def _choose_order(scene: Scene, recording: Recording, t: Array, start: float) -> tuple[Recording, Scene]:
-    """Return the recording with the order of quaternions that fits the exact motion better, and the scene of that order."""
+def _begin(scene: Scene, recording: Recording, from_row: bool) -> tuple[Scene, Array, float]:
+    """Return the scene that starts as a recording does, the times of its rows, and the time of its start."""
+    (R, w), t, first = recording.data, recording.t, float(recording.t[0])
+    timed = bool(scene.loads or scene.features & IN_TIME)
+    if first < 0 and (timed or not from_row):
+        raise BadInput("run", recording.label(f"a first row at {first:g} s"), "times of the scene, from 0 on")
+    if timed:  # its loads need values in all rows
+        try:
+            scene = scene.rename(scene.name, t_end=max(scene.t_end, float(t[-1])))
+        except BadInput as short:
+            got = recording.label(f"rows until {t[-1]:g} s, and {short.argument}: {short.got}")
+            raise BadInput("run", got, f"rows within the table (--until), or {short.allowed}") from None
+    elif from_row:  # sums of steps and a large time would lose digits
+        t = t - first
+    if from_row:
+        changes = {name: x[0] for name, x in (("R_WB0", R), ("w_WB_B0", w)) if x is not None}
+        if len(changes) == 1 and timed and 0 < first <= scene.t_end:
+            Rs, ws = truth(scene, 0.0, np.array([0.0, first]))
+            changes = {"R_WB0": Rs[1], "w_WB_B0": ws[1]} | changes
+        scene = scene.rename(scene.name, **changes)
+    return scene, t, float(t[0]) if from_row else 0.0
+
+
+def _settle(scene: Scene, recording: Recording, from_row: bool) -> tuple[Recording, list[str]]:
+    """Return the reading of a recording that fits the motion of the scene, where no name has the order or the unit, and notes.
+
+    A unit is the only one in which the first row is the start of the scene, or the only one in which the motion fits. An order
+    is the one that fits better. Raises `BadInput` if the data do not decide the unit.
+    """
+    readings, notes = list(recording.readings), list[str]()
+    if not readings:
+        return recording, notes
+    kinds, why = readings[0].layout.open, "is the first row the start of the scene"
+    started = [reading for reading in readings if _starts(scene, reading)]
+    if kinds and started and all(reading.layout.used == started[0].layout.used for reading in started):
+        readings = [reading for reading in readings if reading.layout.used == started[0].layout.used]
+    elif kinds:
+        why = "does the motion fit the scene"
+    ranked = sorted(((_misfit(scene, reading, from_row), i) for i, reading in enumerate(readings)))
+    least, chosen = ranked[0][0], readings[ranked[0][1]]
+    others = [misfit for misfit, i in ranked if readings[i].layout.used != chosen.layout.used]
+    if others and not (least <= FITS * min(1.0, *others) and min(others) > CLEAR):
+        raise no_unit(recording.path, [name for kind in kinds for name in chosen.layout.used[kind]])
+    for kind in kinds:
+        names = chosen.layout.used[kind]
+        notes.append(f"{', '.join(names)}: read in {'rad' if 1.0 in names.values() else 'deg'}, because only so {why}.")
+    if len({reading.options.quaternion for reading in readings}) > 1:
+        notes.append(f"The order of the quaternions is not named; {chosen.options.quaternion} fits better.")
+    return replace(chosen, readings=()), notes
+
+
+def _misfit(scene: Scene, recording: Recording, from_row: bool) -> float:
+    """Return the mean error of rows, rad and relative to their largest rate."""
+    scene, t, start = _begin(scene, recording, from_row)
+    some, w, usual = np.unique(np.linspace(0, len(t) - 1, ROWS_OF_READINGS).astype(int)), recording.data[1], allow()
+    scale = 1.0 if w is None else float(np.abs(w).max()) or 1.0
+    case = Compared(scene, t[some], take_rows(recording.data, some), start, scale, usual.errors, usual.noise)
+    return float(case.error.max(axis=0).mean())
+
+
+def _starts(scene: Scene, recording: Recording) -> bool:
+    """Return whether the first row is the start of the scene, up to its digits."""
     R, w = recording.data
-    assert R is not None
-    usual = allow()
-    first = Compared(scene, t, (R, w), start, 1.0, usual.errors, usual.noise)
-    other = first.read(from_quaternion(np.roll(to_quaternion(R), 1, axis=1)), w)
-    case, order = min((first, "wxyz"), (other, "xyzw"), key=lambda candidate: float(candidate[0].error.mean()))
-    options = replace(recording.options, quaternion=order)
-    return replace(recording, data=case.data, order_known=True, options=options), case.scene
+    size = float(np.linalg.norm(scene.w_WB_B0))
+    turned = R is None or angle_between(R[:1], scene.R_WB0[None])[0] <= STARTS
+    return bool(turned and (w is None or (size > 0 and np.linalg.norm(w[0] - scene.w_WB_B0) <= STARTS * size)))
 
 
 def _rounded(recording: Recording, t: Array, rates: Array, scale: float) -> Array:
@@ -136,7 +184,8 @@ def _rounded(recording: Recording, t: Array, rates: Array, scale: float) -> Arra
     time, attitude, rate = recording.digits
     w, acceleration = recording.data[1], 0.0
     if w is not None:
-        slopes = np.linalg.norm(np.diff(w, axis=0), axis=1) / np.diff(t)
+        # Where the body turns by more than 1 rad from row to row, rates have changed by more than the rows show.
+        slopes = np.linalg.norm(np.diff(w, axis=0), axis=1) * np.maximum(1 / np.diff(t), scale)
         acceleration = float(slopes[rates[1:] <= 10 * scale].max(initial=0.0))
     if rate <= 2.0**-52 * rates.max():  # double precision is relative to each row
         rate = min(rate, 2.0**-53 * scale)
@@ -199,9 +248,8 @@ class Comparison:
 def compare(case: Compared, recording: Recording, from_row: bool) -> Comparison:
     """Compare the rows that are kept for fits, and if they agree, all rows of the file."""
     undecided, shift = "", float(recording.t[0] - case.t[0])
-    gap = float(np.median(np.diff(case.t))) * case.scale
-    if not has_closed_form(case.scene) and gap > NUMERICAL / 10:
-        got = f"rows between which the body turns by {gap:.2g} rad"
+    if not has_closed_form(case.scene) and case.gap > NUMERICAL / 10:
+        got = f"rows between which the body turns by {case.gap:.2g} rad"
         raise BadInput("run", recording.label(got), "closer rows, or the unit of the time in the header, such as time (ms)")
     if not has_closed_form(case.scene) and len(near := case.first(NUMERICAL, 2).t) < len(case.t):
         case = case.take(slice(0, len(near)))
@@ -231,11 +279,11 @@ def _stretches(case: Compared, from_row: bool) -> tuple[list[Compared], str, Arr
     whole = all(x is not None for x in case.data) or (case.data[1] is not None and case.scene.free)
     while True:
         end = len(rest.t)
-        if from_row and whole and end > 2:
+        if from_row and whole and end > 2 and not case.far:
             end, growth = _reach(rest)
             rest = replace(rest, growth=growth)
         part = rest.take(slice(0, end))
-        if part.free and not part.passes(part.error) and _near(part):
+        if part.free and not case.far and not part.passes(part.error) and _near(part):
             alone = np.maximum(alone, part.error.max(axis=1))
             initial, _, _ = part.fit(exact(part), np.zeros(0), np.zeros(0))
             fitted = part.at(initial)
@@ -253,7 +301,7 @@ def _stretches(case: Compared, from_row: bool) -> tuple[list[Compared], str, Arr
         changes = {name: x[0] for name, x in zip(("R_WB0", "w_WB_B0"), rest.data, strict=True) if x is not None}
         rest = replace(rest, scene=rest.scene.rename(rest.scene.name, **changes), start=float(rest.t[0]))
     part = parts[0]
-    if from_row and not whole and len(parts) == 1 and not part.passes(part.error) and len(part.t) > 3:
+    if from_row and not whole and not case.far and len(parts) == 1 and not part.passes(part.error) and len(part.t) > 3:
         guessed = replace(part, free=tuple(range(6)))
         initial, _, _ = guessed.fit(exact(guessed), np.zeros(0), np.zeros(0))
         guessed = replace(guessed.at(initial), free=part.free)

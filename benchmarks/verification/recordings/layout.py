@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from conservative.attitude import Array
 
-from .names import split_name
+from .names import LETTERS, parse
 
 ATTITUDES: Mapping[str, int] = {
     "quaternion": 4,
@@ -23,8 +22,8 @@ ATTITUDES: Mapping[str, int] = {
     "Rodrigues": 3,
 }
 """Kinds of attitudes, best first, with their numbers of columns."""
-ORDER = "(?:wxyz|xyzw)"
-"""Orders of quaternions, as a pattern."""
+ORDERS = "wxyz", "xyzw"
+"""Orders of quaternions."""
 
 
 @dataclass(frozen=True)
@@ -51,15 +50,19 @@ class Layout:
     """How a file is read: the names of its columns, and the units of those that are used.
 
     `unused` has a reason for every other column, and `doubtful` the columns among them that look like attitudes or rates.
-    `also` has other attitudes in the file, by kind, which should be the same. `origin` is subtracted from times in two columns,
-    seconds and their fractions.
+    `also` has other sets of columns, each with its kind, which should be the same motion. `decided` are columns that the data
+    left out. `steps` are units of times that an option names, `open` are quantities whose unit only the motion of the scene
+    shows. `origin` is subtracted from times in two columns, seconds and their fractions.
     """
 
     names: list[str]
     used: dict[str, dict[str, float]] = field(default_factory=dict)
     unused: dict[str, str] = field(default_factory=dict)
     doubtful: list[str] = field(default_factory=list)
-    also: dict[str, list[str]] = field(default_factory=dict)
+    also: list[tuple[str, list[str]]] = field(default_factory=list)
+    decided: list[str] = field(default_factory=list)
+    steps: dict[str, float] = field(default_factory=dict)
+    open: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     origin: float = 0.0
 
@@ -80,8 +83,10 @@ class Layout:
     @property
     def numbered(self) -> bool:
         """Whether the quaternion's columns are numbered, so that their order is open. MuJoCo's qpos are scalar first."""
-        keys = [split_name(name)[0] for name in self.used.get("quaternion", ())]
-        return bool(keys) and keys[0][-1:] not in [*"wxyz"] and not re.match(f"qpos|.*{ORDER}.$", keys[0])
+        first = next((parse(name) for name in self.used.get("quaternion", ())), None)
+        if first is None:
+            return False
+        return first.label not in (*LETTERS, *"ijkr", "real") and not {"qpos", *ORDERS}.intersection(first.words)
 
     @property
     def columns(self) -> list[str]:

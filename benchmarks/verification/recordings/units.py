@@ -18,14 +18,44 @@ from conservative.errors import BadInput
 
 from .attitudes import convert
 from .layout import Layout, Options
-from .names import split_name
+from .names import UNITS, parse
+from .times import DATES, DAYS, FRACTIONS
+
+ANGULAR = 1.0, math.pi / 180
+"""Units that angles and rates without a unit may have: rad and deg."""
+AGREES, DISAGREES = 0.1, 0.5
+"""Largest disagreement of attitudes and rates in their units, and the smallest one in all others, relative to the turns."""
 
 
-def no_unit(path: Path, names: Sequence[str]) -> BadInput:
+def no_unit(path: Path | None, names: Sequence[str]) -> BadInput:
     """Return the error of columns whose unit is not known."""
     header = re.sub(r"\s*[(\[].*", "", names[0])
-    allowed = f"a header such as {header} (deg/s), or one without a unit and --units deg or rad"
+    allowed = f"--units deg or --units rad, or a header with units such as {header} (deg/s)"
     return BadInput("run", f"{path}, columns {', '.join(names)}, without a known unit", allowed)
+
+
+def find_sizes(path: Path | None, layout: Layout, kind: str, names: Sequence[str], options: Options) -> dict[str, float]:
+    """Return the sizes of the units of columns, nan for those that no name and no option has."""
+    if kind == "time":
+        if len(names) == 2:  # seconds and their fractions
+            return {names[0]: 1.0, names[1]: FRACTIONS[parse(names[1]).all[-1]]}
+        if names[0] in layout.steps:
+            return {names[0]: layout.steps[names[0]]}
+        if DAYS.intersection(parse(names[0]).words):
+            return {names[0]: 86_400.0}
+        if parse(names[0]).unit in DATES:
+            return {names[0]: 1.0}
+    usual: str | None = "s" if kind == "time" else "rad"
+    texts, united = [parse(name).unit for name in names], kind in ("rates", "angles", "rotation vector")
+    if None in texts and united:
+        usual = None if "/" in (options.units or "") and kind != "rates" else options.units
+        layout.notes += ["unit"] * (usual is not None)
+    if not united and kind != "time":  # a unit behind a quaternion is no unit
+        return dict.fromkeys(names, 1.0)
+    sizes = [math.nan if (unit := text or usual) is None else UNITS.get(unit, 0.0) for text in texts]
+    if 0.0 in sizes:
+        raise no_unit(path, names)
+    return dict(zip(names, sizes, strict=True))
 
 
 def guess_time(values: Array, layout: Layout) -> None:
@@ -34,46 +64,70 @@ def guess_time(values: Array, layout: Layout) -> None:
     if more:  # seconds and their fractions: the sum would lose digits
         layout.origin = math.floor(values[0, 0]) if values[0, 0] > 1e6 else 0.0
         layout.notes += [f"Times are from {layout.origin:.0f} s on."] * bool(layout.origin)
-    elif size == 1.0 and split_name(name)[1] is None and values[0, 0] > 1e11:  # 1e11 s is the year 5138
+    elif size == 1.0 and parse(name).unit is None and values[0, 0] > 1e11:  # 1e11 s is the year 5138
         power = 3 * int(1 + (values[0, 0] > 1e14) + (values[0, 0] > 1e17))
         layout.used["time"] = {name: 10.0**-power}
         layout.notes.append(f"{name} is read as a time since 1970 in 1e-{power} s, because of its size.")
 
 
-def find_units(path: Path, values: Array, layout: Layout, options: Options) -> None:
-    """Find units that no column names: attitudes and rates agree in one choice of units only, or their format defines them."""
-    parts, some, (time, *_) = layout.used, values[:400], layout.used["time"]
+def find_units(values: Array, layout: Layout, options: Options) -> None:
+    """Find units that no column names: attitudes and rates agree in one choice of units only, or their format defines them.
+
+    Kinds whose unit remains open are in `layout.open`. They are read in rad until the motion of the scene decides.
+    """
+    parts, time = layout.used, [*layout.used["time"]]
     open_ = [kind for kind, part in parts.items() if any(map(math.isnan, part.values()))]
-    turns = some[:, 1 + len(parts["rates"]) :]
+    turns = values[:400, 1 + len(parts["rates"]) :]
     # Rotation vectors of up to a revolution are in rad: in degrees they would all be tiny.
-    short = layout.attitude == "rotation vector" and np.linalg.norm(turns, axis=1).max() < 2.1 * math.pi
+    short = layout.attitude == "rotation vector" and len(turns) and np.linalg.norm(turns, axis=1).max() < 2.1 * math.pi
     usual = [1.0 if short and kind == layout.attitude else _usual(parts[kind]) for kind in open_]
-    expected = (parts["time"][time], *usual)
-    whole = split_name(time)[1] is None and expected[0] == 1.0 and bool((some[:, 0] == np.rint(some[:, 0])).all())
-    choices = [(1.0, 1e-3, 1e-6, 1e-9) if whole else expected[:1], *[(1.0, math.pi / 180)] * len(open_)]
-    ranked: list[tuple[float, Any]] = []
-
-    def choose(sizes: Sequence[Any]) -> None:
-        for kind, size in zip(("time", *open_), sizes, strict=True):
-            if len(parts[kind]) != 2:  # seconds and their fractions
-                parts[kind] = dict.fromkeys(parts[kind], size)
-
-    for sizes in product(*choices) if layout.attitude and parts["rates"] and len(some) > 2 else ():
-        choose(sizes)
-        orders = (options.quaternion,) if options.quaternion or not layout.numbered else ("wxyz", "xyzw")
-        off = [_disagreement(some * layout.sizes, layout, replace(options, quaternion=order)) for order in orders]
-        ranked.append((min(off), sizes))
-    ranked.sort()
+    expected = (parts["time"][time[0]], *usual)
+    ranked = rank_units(values, layout, options)
     # One choice agrees, and all others clearly do not.
-    if len(ranked) > 1 and ranked[0][0] < 0.1 and ranked[1][0] > 0.5:
+    if len(ranked) > 1 and ranked[0][0] < AGREES and ranked[1][0] > DISAGREES:
         for kind, size, usual_size in zip(("time", *open_), ranked[0][1], expected, strict=True):
             if size != usual_size:
                 unit = f"{size:g} s" if kind == "time" else "rad" if size == 1.0 else "deg"
                 layout.notes.append(f"{', '.join(parts[kind])}: read in {unit}, because only so do attitudes and rates agree.")
         expected = ranked[0][1]
-    if None in expected:
-        raise no_unit(path, [*parts[open_[0]]])
-    choose(expected)
+    layout.open = [kind for kind, size in zip(open_, expected[1:], strict=True) if size is None]
+    set_sizes(layout, ("time", *open_), [1.0 if size is None else size for size in expected])
+
+
+def open_readings(layout: Layout, options: Options) -> list[tuple[Layout, Options]]:
+    """Return the layouts and options in which a file may be read, if only the motion of the scene shows units or orders."""
+    orders = ("wxyz", "xyzw") if layout.numbered and options.quaternion is None else (options.quaternion,)
+    out = []
+    for sizes in product(ANGULAR, repeat=len(layout.open)):
+        reading = replace(layout, used=dict(layout.used))
+        set_sizes(reading, layout.open, sizes)
+        out += [(reading, replace(options, quaternion=order)) for order in orders]
+    return out
+
+
+def set_sizes(layout: Layout, kinds: Sequence[str], sizes: Sequence[Any]) -> None:
+    """Set the units of quantities; seconds and their fractions keep theirs."""
+    for kind, size in zip(kinds, sizes, strict=True):
+        if kind != "time" or len(layout.used[kind]) == 1:
+            layout.used[kind] = dict.fromkeys(layout.used[kind], size)
+
+
+def rank_units(values: Array, layout: Layout, options: Options) -> list[tuple[float, Any]]:
+    """Return choices of units that no column names, of the time and of other quantities, by their disagreement."""
+    some, parts = values[:400], dict(layout.used)
+    (time, size), *_ = parts["time"].items()
+    open_ = [kind for kind, part in parts.items() if any(map(math.isnan, part.values()))]
+    named = parse(time).unit is not None or time in layout.steps or size != 1.0
+    whole = not named and bool((some[:, 0] == np.rint(some[:, 0])).all())
+    choices = [(1.0, 1e-3, 1e-6, 1e-9) if whole else (size,), *[ANGULAR] * len(open_)]
+    ranked: list[tuple[float, Any]] = []
+    for sizes in product(*choices) if layout.attitude and parts["rates"] and len(some) > 2 else ():
+        set_sizes(layout, ("time", *open_), sizes)
+        orders = (options.quaternion,) if options.quaternion or not layout.numbered else ("wxyz", "xyzw")
+        off = [_disagreement(some * layout.sizes, layout, replace(options, quaternion=order)) for order in orders]
+        ranked.append((min(off), sizes))
+    layout.used = parts
+    return sorted(ranked)
 
 
 def _disagreement(values: Array, layout: Layout, options: Options) -> float:
@@ -83,10 +137,15 @@ def _disagreement(values: Array, layout: Layout, options: Options) -> float:
     assert w is not None
     turned = Rotation.from_matrix(np.swapaxes(R[:-1], 1, 2) @ R[1:]).as_rotvec()
     expected = (w[:-1] + w[1:]) / 2 * np.diff(t)[:, None]
-    return float(np.linalg.norm(turned - expected) / (min(np.linalg.norm(turned), np.linalg.norm(expected)) or 1.0))
+    size = min(float(np.linalg.norm(turned)), float(np.linalg.norm(expected)))
+    return float(np.linalg.norm(turned - expected)) / size if size else math.inf  # a body at rest shows no units
+
+
+_OURS = ("w", "wb", "b"), ("omega", "bn", "b")
 
 
 def _usual(names: Iterable[str]) -> float | None:
     """Return the unit of columns that name none, where their format defines it: ROS, MuJoCo, Basilisk, and this package."""
-    key = split_name(next(iter(names)))[0]
-    return 1.0 if re.search(r"wwbb|angularvelocity[xyz]|qvel|omegabnb|sigma", key) else None
+    words = parse(next(iter(names))).words
+    known = {"angular", "velocity"} <= {*words} or {"twist", "angular"} <= {*words} or words[:3] in _OURS or "qvel" in words
+    return 1.0 if known else None

@@ -23,6 +23,8 @@ from ..explanation import Explanation
 from ..finding import Cause, Finding, Verdict, Verification, uncapitalised
 from ..mistakes import BY_KEY
 from .comparison import MOST_NOISE, Comparison, compare, prepare
+from .describe import Description, at_rest, only_noise, unseen
+from .rows import OUTSIDE, REPEATED
 from .table import Recording
 
 ACCURATE, ACCURATE_SINGLE = 1e-6, 1e-4
@@ -35,6 +37,19 @@ FAR = 0.05
 HIDDEN = (
     "The motion multiplies the digits or the noise of the first row to the size of the error. More digits, a shorter file "
     "(--until), or --start scene decide"
+)
+
+RESTING = (
+    "The body is at rest in all rows, and the scene starts with {rate:.3g} rad/s, so that the file does not show its motion. "
+    "--start scene decides"
+)
+FAR_APART = (
+    "The body turns by {angle:.2g} rad from row to row, so that the digits of the first row decide where it is in all others. "
+    "Closer rows decide, or the unit of the time in the header, such as time (ms)"
+)
+NOISE_ONLY = (
+    "The rows are noise as large as their motion, as of a body at rest, and show no motion. Rows of a motion, or --error, "
+    "decide"
 )
 
 
@@ -67,14 +82,16 @@ class Details:
 
     Attributes
     ----------
+    description
+        What the recording is: its rows, times, digits and noise.
     error, allowed, by, noise
         Largest errors, the allowed ones, what allows them, and the noise of one axis.
     digits
         Largest rounding of times, s, attitudes, rad, and rates, rad/s, by the digits of the file.
     first_row
         Errors of the motion that starts exactly in the first row, if a fitted start has smaller ones; else 0.
-    units
-        Units in which attitudes and rates are shown.
+    units, scale
+        Units in which attitudes and rates are shown, and the largest rate, rad/s.
     compared, in_file
         Numbers of rows.
     used
@@ -95,6 +112,7 @@ class Details:
         Times (n,), s, and values (n,) of each quantity at them.
     """
 
+    description: Description
     error: tuple[float, float]
     allowed: tuple[float, float]
     by: tuple[str, str]
@@ -102,6 +120,7 @@ class Details:
     digits: tuple[float, float, float]
     first_row: tuple[float, float]
     units: tuple[Unit, Unit]
+    scale: float
     compared: int
     in_file: int
     used: Mapping[str, Sequence[str]]
@@ -117,6 +136,12 @@ class Details:
     def show(self, errors: Sequence[float]) -> str:
         """Return errors of attitudes and rates, as far as the recording has them, in their units."""
         return " and ".join(unit.show(error) for error, unit in zip(errors, self.units, strict=True) if unit.size)
+
+    @property
+    def lines(self) -> tuple[str, str]:
+        """Two sentences on what the recording is: on rows and times, and on digits and noise."""
+        attitudes, rates = self.units
+        return self.description.lines(bool(attitudes.size), bool(rates.size), self.scale, rates.name == "deg/s")
 
     @property
     def worse(self) -> int:
@@ -173,26 +198,35 @@ def verify_recording(
     shaped, explained = comparison.shape[0] <= shape_allowed, Diagnosis()
     if comparison.outliers and not comparison.passed:
         explained = Diagnosis([_single_rows(comparison)])
-    elif not comparison.passed:
+    elif not comparison.passed and not (error is None and only_noise(comparison.case)):
         tell("explain")
         whole = replace(comparison.case, growth=comparison.parts[0].growth)
         explained = diagnose(whole, recording.layout.attitude in (None, "quaternion"), tell)
     # Numbers that are fitted to rows that a start can explain as well prove nothing.
-    hidden = not (comparison.passed or comparison.outliers) and error is None and comparison.case.hidden()
+    decided = comparison.passed or comparison.outliers or comparison.case.far
+    hidden = not decided and error is None and comparison.case.hidden()
     proven = [explanation for explanation in explained.named if explanation.explains and not (hidden and explanation.numbers)]
     verdict, doubt = Verdict.WRONG, ""
     if comparison.passed and shaped:
         verdict, doubt = Verdict.RIGHT, comparison.undecided or recording.doubt(error)
+        if from_row and at_rest(comparison.case) and scene.w_WB_B0.any():
+            doubt = doubt or RESTING.format(rate=float(np.linalg.norm(scene.w_WB_B0)))
     elif error is None and shaped and not proven:
         doubt = HIDDEN if hidden else _doubt(comparison.case, comparison.errors, rows.resolved, recording)
     verdict = Verdict.UNDECIDED if doubt else verdict
     case = comparison.case
     # With noise, the fit shows how well the recording determines the moments.
-    if verdict is Verdict.RIGHT and case.noise.max() > 1e-6 and case.scene.free and case.scene.body.rotor_momentum is None:
+    if (
+        verdict is Verdict.RIGHT
+        and not case.far
+        and case.noise.max() > 1e-6
+        and case.scene.free
+        and case.scene.body.rotor_momentum is None
+    ):
         tell("moments")
         fit = fit_moments(case)
         notes += [f"{fit.sentence}."] * bool((np.array(fit.left) <= case.allowed).all())
-    notes += explained.notes
+    notes += [*explained.notes, *(unseen(case) if verdict is Verdict.RIGHT else [])]
     if len(comparison.parts) > 1:
         notes.append(
             f"The exact motion starts again in {len(comparison.parts) - 1} rows: it multiplies the rounding of a row too much."
@@ -203,6 +237,7 @@ def verify_recording(
     limits = [size * x for (_, size), x in zip(units, case.allowed.tolist(), strict=True) if size]
     largest = comparison.worst.max(axis=1)
     details = Details(
+        description=recording.describe((float(rows.noise[0]), float(rows.noise[1]) * case.scale)),
         error=_pair(largest),
         allowed=_pair(case.allowed),
         by=rows.allowed.by,
@@ -210,6 +245,7 @@ def verify_recording(
         digits=recording.digits,
         first_row=_pair(comparison.alone),
         units=units,
+        scale=case.scale,
         compared=comparison.compared,
         in_file=recording.rows + sum(recording.left_out.values()),
         used={kind: tuple(part) for kind, part in recording.layout.used.items() if part},
@@ -255,10 +291,12 @@ def _reason(finding: Finding, details: Details, proven: Sequence[Explanation]) -
     """Return the reason of the verdict: the errors, the allowed errors, and the mistakes with the errors that they leave."""
     allowed = details.show(details.allowed)
     verb = "are" if all(unit.size for unit in details.units) else "is"
+    left = sum(count for reason, count in details.description.left_out.items() if reason not in (OUTSIDE, REPEATED))
     decided = [
         f"its largest error is {details.show(details.error)}",
         f"{allowed} {verb} allowed by {'--error' if finding.by == 'error' else f'its {finding.by}'}",
         *([details.shape] if details.shape else []),
+        *([f"{left:,} of {details.in_file:,} rows are left out"] if 2 * left > details.in_file else []),
     ]
     causes = [
         uncapitalised(explanation.sentence) + (f" (leaves {details.show(explanation.left)})" if max(explanation.plain) else "")
@@ -281,6 +319,10 @@ def _single_rows(comparison: Comparison) -> Explanation:
 
 def _doubt(case: Compared, errors: Array, resolved: Array, recording: Recording) -> str:
     """Return the sentence on the data that would decide, if errors may be harmless; "" if they are wrong."""
+    if case.far:
+        return FAR_APART.format(angle=case.gap)
+    if only_noise(case):
+        return NOISE_ONLY
     single = max(recording.digits[1:]) > 1e-9  # fewer than nine digits
     if errors.max() <= (ACCURATE_SINGLE if single else ACCURATE) and errors.max() > case.allowed.min():
         return (

@@ -37,12 +37,112 @@ def test_rows_without_numbers_are_gaps_but_not_at_the_end(tmp_path):
     assert verify(tmp_path, {"t": T} | with_nan(T > 5)).verdict == "undecided"  # a program that ends in nan
 
 
-def test_the_same_row_twice_is_read_once(tmp_path):
-    twice = np.repeat(np.arange(len(T)), np.where(np.arange(len(T)) % 7 == 3, 3, 1))
-    found = verify(tmp_path, {"t": T[twice]} | {name: x[twice] for name, x in MOTION.items()})
-    assert (found.verdict, found.details.in_file - found.details.compared) == ("right", len(twice) - len(T))
-    with pytest.raises(BadInput, match="row 5: a time that is not later"):
-        verify(tmp_path, {"t": T[twice]} | {name: x[twice] + 1e-3 * np.arange(len(twice)) for name, x in MOTION.items()})
+ROWS = np.arange(len(T))
+TWICE = np.repeat(ROWS, np.where(ROWS % 7 == 3, 3, 1))
+REPEATED = {
+    "some rows": TWICE,
+    "nearly all rows": np.repeat(ROWS, np.where(ROWS % 9 == 0, 1, 2)),
+    "two loggers": np.stack([ROWS, np.maximum(ROWS - 4, 0)], axis=1).ravel(),
+    "in blocks": np.concatenate([np.tile(block, 2) for block in np.split(ROWS[:-1], 6)]),
+}
+
+
+@pytest.mark.parametrize("name", REPEATED)
+def test_the_same_row_twice_is_read_once(name, tmp_path):
+    rows = REPEATED[name]
+    found = verify(tmp_path, {"t": T[rows]} | {column: x[rows] for column, x in MOTION.items()})
+    assert (found.verdict, found.details.description.left_out) == (
+        "right",
+        {"equal to another row, with its time": len(rows) - len(set(rows))},
+    )
+
+
+def in_order(rows, t=T):
+    """The motion in another order of rows, each with its time."""
+    return {"t": t[rows]} | {column: x[rows] for column, x in MOTION.items()}
+
+
+def one_time(row, t):
+    """The motion with one wrong time."""
+    times = T.copy()
+    times[row] = t
+    return {"t": times} | MOTION
+
+
+SWAPPED = np.array([*ROWS[:40], 41, 40, *ROWS[42:]])
+FEW = {
+    "a late row": (in_order(np.insert(np.delete(ROWS, 30), 34, 30)), "earlier than a row before", 1),
+    "two rows swapped": (in_order(SWAPPED), "earlier than a row before", 1),
+    "a time in the future": (one_time(50, 1e6), "later than the rows after", 1),
+    "a first time in the future": (one_time(0, 1e6), "later than the rows after", 1),
+    "an equal time": (one_time(50, T[49]), "with the time of another row, and other values", 1),
+    "a clock set back after the start": (one_time(ROWS[:2], T[:2] + 50), "after or before the clock was set back", 2),
+    "no numbers": ({"t": T} | with_nan(ROWS == 9), "without numbers", 1),
+    "infinite": ({"t": T} | {name: np.where(ROWS % 7 == 2, np.inf, x) for name, x in MOTION.items()}, "without numbers", 17),
+    "-9999": ({"t": T} | {name: np.where(ROWS % 7 == 2, -9999, x) for name, x in MOTION.items()}, "such as -9999", 17),
+    "-9999 of one sensor": (
+        {"t": T} | {name: np.where(ROWS % 7 == 2, -9999, x) if name in RATES else x for name, x in MOTION.items()},
+        "such as -9999",
+        17,
+    ),
+    "lost sight": (
+        {"t": T} | {name: np.where(ROWS % 7 == 2, 0, x) if name in QUATERNION else x for name, x in MOTION.items()},
+        "zeros",
+        17,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", FEW)
+def test_rows_without_a_motion_or_out_of_order_are_left_out_and_counted(name, tmp_path, unnamed):
+    table, reason, count = FEW[name]
+    found = verify(tmp_path, table)
+    assert found.verdict == "right", found.sentence
+    assert max(found.details.error) < 1e-12  # measured: 3e-14
+    ((text, left_out),) = found.details.description.left_out.items()
+    assert (reason in text, left_out) == (True, count)
+    assert f"{count} row{'s' * (count > 1)} {text}" in found.details.lines[1]
+    wrong = {column: x * (1 + 1e-3 * T) if column in RATES else x for column, x in table.items()}
+    assert verify(tmp_path, wrong).verdict == "wrong"
+
+
+MANY = {
+    "equal times": {"t": np.floor(T / 0.1) * 0.1} | MOTION,
+    "shuffled": in_order(np.random.default_rng(0).permutation(ROWS)),
+    "backwards": in_order(ROWS[::-1]),
+    "two loggers out of order": in_order(np.stack([ROWS[::2][:-1], ROWS[1::2]], axis=1)[:, ::-1].ravel()),
+}
+
+
+@pytest.mark.parametrize("name", MANY)
+def test_many_rows_out_of_order_are_refused_with_the_first_one(name, tmp_path):
+    with pytest.raises(BadInput, match="rows out of order, the first of them row"):
+        verify(tmp_path, MANY[name])
+
+
+def test_the_rows_of_the_longer_clock_are_compared_and_the_others_forbid_right(tmp_path, unnamed):
+    """The clock was set back in the middle: times of the rows before and after it do not belong together."""
+    for first, compared in ((40, 81), (81, 81)):
+        t = np.where(first > ROWS, T + 100, T - T[first])
+        found = verify(tmp_path, {"t": t} | MOTION)
+        assert (found.verdict, found.details.compared) == ("undecided", compared)
+        assert "The clock was set back" in found.findings[0].detail
+        damped = {column: x * np.exp(-0.01 * T) if column in RATES else x for column, x in MOTION.items()}
+        assert verify(tmp_path, {"t": t} | damped).verdict == "wrong"
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -9999, 0], ids=str)
+def test_an_end_without_numbers_is_undecided(value, tmp_path):
+    table = {name: np.where(T > 5, value, x) if name in QUATERNION else x for name, x in MOTION.items()}
+    assert verify(tmp_path, {"t": T} | table).verdict == "undecided"
+
+
+def test_more_than_half_of_the_rows_left_out_are_in_the_reason(tmp_path):
+    """A sensor of attitudes that is slower than the rates."""
+    for every, told in ((4, True), (2, False)):
+        found = verify(tmp_path, {"t": T} | with_nan(ROWS % every > 0))
+        assert found.verdict == "right"
+        assert ("rows are left out" in found.reason) is told
 
 
 WRAPS = {"time (us)": (1e-6, 2.0**32), "time_ms": (1e-3, 2.0**16), "t": (1.0, 86_400.0), "time (s)": (1.0, 2.0**32 * 1e-6)}

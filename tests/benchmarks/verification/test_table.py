@@ -174,10 +174,6 @@ def test_the_message_offers_the_columns_that_differ_by_their_axes(tmp_path):
 WRONG = {
     "no time": (lambda c: c.pop("time"), "without columns of the time"),
     "one rate": (lambda c: [c.pop(name) for name in list(c)[2:]], "without columns of attitudes or rates"),
-    "no unit": (
-        lambda c: c.update({f"w_{axis}": c.pop(f"w_{axis} (rad/s)") for axis in "xyz"}),
-        "--units deg or rad",
-    ),
     "backwards": (lambda c: c.update(time=np.where(T[7] == T, 0, T)), "row 8: a time that is not later"),
     "not a number": (lambda c: c.update(q_w=np.where(T[4] == T, "lost", Q[:, 0])), "row 5, column q_w: 'lost'"),
     "norm 0": (
@@ -189,7 +185,7 @@ WRONG = {
 
 @pytest.mark.parametrize("name", WRONG)
 def test_a_file_that_cannot_be_judged_is_a_sentence_with_its_name_and_row(name, tmp_path):
-    columns = dict(TABLES["wxyz"][0]) if name not in ("one rate", "no unit") else {"time": T, **RATES}
+    columns = dict(TABLES["wxyz"][0]) if name != "one rate" else {"time": T, **RATES}
     spoil, expected = WRONG[name]
     spoil(columns)
     path = write(tmp_path, columns)

@@ -103,7 +103,6 @@ def test_the_same_right_motion_in_the_layouts_that_people_have(name, tmp_path):
 
 BAD = {
     "unnamed": ("time,z,y,x", (T, W), "--columns time=time,w=x:y:z"),
-    "no unit": ("t,w_x,w_y,w_z", (T, W), "--units deg or rad"),
     "header alone": ("t,w_x (rad/s),w_y (rad/s),w_z (rad/s)", (T[:0], W[:0]), "no row of numbers"),
     "equal times": ("t,w_x (rad/s),w_y (rad/s),w_z (rad/s)", (np.where(T[7] == T, T[6], T), W), "row 8"),
 }

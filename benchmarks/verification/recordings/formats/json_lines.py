@@ -12,7 +12,7 @@ import numpy as np
 
 from conservative.attitude import Array
 
-from .table import UNREADABLE, Start, Table
+from .table import UNREADABLE, Start, Table, list_numbers, read_date
 
 ENDINGS = ".jsonl", ".ndjson", ".json"
 
@@ -47,6 +47,8 @@ def _flat(record: Mapping[str, Any], before: str = "") -> dict[str, Any]:
     """Return the values of a JSON object by name. A nested value has a name such as angular_velocity.x, or q.0 in a list."""
     out: dict[str, Any] = {}
     for name, value in record.items():
+        if isinstance(value, str) and (numbers := list_numbers(value)):
+            value = numbers
         parts = dict(enumerate(value)) if isinstance(value, list) else value if isinstance(value, dict) else None
         out |= {f"{before}{name}": value} if parts is None else _flat({str(k): v for k, v in parts.items()}, f"{before}{name}.")
     return out
@@ -55,6 +57,8 @@ def _flat(record: Mapping[str, Any], before: str = "") -> dict[str, Any]:
 def _number(value: Any) -> float:
     """Return a value as a number: NaN for a gap, whose row is left out, and infinity for other values, which are refused."""
     try:
+        if isinstance(value, str) and (":" in value or value.count("-") == 2):
+            return read_date(value)
         return math.nan if value is None else math.inf if isinstance(value, bool) else float(value)
     except (TypeError, ValueError, OverflowError):
         return math.inf
