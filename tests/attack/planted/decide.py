@@ -24,8 +24,8 @@ from .worlds import Draw, World, is_table, scaled
 FLOOR, WRONG, IDENTIFIABLE = 1e-9, 3.0, 10.0
 NEAR = 0.2
 """Largest difference, rad or relative, with which fits begin."""
-FEWEST = 12
-"""Smallest number of rows of a fit."""
+FEWEST, ENOUGH = 12, 8
+"""Smallest number of rows of a fit, and of rows that determine a mistake."""
 CLOSE = 300.0
 """Difference, in grains, above which another mistake is not taken for a long step, or for times that scatter."""
 SMALL, MOST = 1e-6, 8
@@ -188,10 +188,12 @@ def decide(made: Any, t: Any, Y: Any) -> None:
         if name != made.mistake and left < IDENTIFIABLE:
             made.same.add(name)
             blocking += [name] * (numbers <= mine)
-    made.identifiable = not blocking and made.size >= IDENTIFIABLE
     made.reason = f"the same rows: {blocking[0]}" if blocking else ""
     if made.size < IDENTIFIABLE:
         made.reason = "noise or digits nearly hide it"
+    elif len(t) < ENOUGH:
+        made.reason = f"fewer than {ENOUGH} rows"
+    made.identifiable = not made.reason
 
 
 def rivals(made: Any, rows: Rows) -> Iterator[tuple[str, int, float]]:
