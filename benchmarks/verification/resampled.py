@@ -258,7 +258,7 @@ def _interpolated(case: Compared, mistake: Resampling, grid: Grid, k: Any) -> So
         after, own = case.t[:n] - grid.first, k[:n]
         share = np.maximum(after / grid.spacing - own, 0.0)
         times = case.start + grid.spacing * np.arange(int(own.max()) + 2), case.start + after
-        known, right = _solve(case, R, w, *times)
+        known, right = _solve(case, R, w, *(np.asarray(each, float) for each in times))
         made = []
         for law, x, y in zip((mistake.attitudes, mistake.rates), known, right, strict=True):
             made.append(y if law is None else np.stack([law(share, each[own], each[own + 1]) for each in x]))

@@ -18,6 +18,7 @@ from ..compare import (
     FEWEST_FOR_NOISE,
     FLOOR,
     HOPELESS,
+    MOST_NOISE,
     NUMERICAL,
     SIGMAS,
     TINY,
@@ -34,8 +35,6 @@ from ..solution import States, has_closed_form, truth
 from .table import Recording
 from .units import no_unit
 
-MOST_NOISE = 0.05
-"""Largest noise, rad or relative to the largest rate. Larger differences of rows are motion."""
 ROUND_OFF = 2e-15
 """Error of an exact motion, rad."""
 ROWS_OF_NOISE = 4000
@@ -94,7 +93,9 @@ def prepare(scene: Scene, recording: Recording, from_row: bool, error: float | N
     rounded = _rounded(recording, t, rates, scale)
     noise, resolved = _find_noise(scene, recording, start, float(t[0]) - first, scale, allow(rounded).errors)
     allowed = allow(rounded, noise, error)
-    inexact = from_row and bool((rounded > 1e-13).any() or (noise > 1e-11).any())
+    have = np.array([R is not None, w is not None])
+    unknown = have & np.logical_not(resolved) & (len(t) >= FEWEST_FOR_NOISE and error is None)
+    inexact = from_row and bool((rounded > 1e-13).any() or (noise > 1e-11).any() or unknown.any())
     free = [*range(3)] * (R is not None) + [*range(3, 6)] * (w is not None)
     case = Compared(
         scene,
@@ -107,7 +108,17 @@ def prepare(scene: Scene, recording: Recording, from_row: bool, error: float | N
         tuple(free) if inexact else (),
         rounded=tuple(allowed.rounded.tolist()),
         flipped=recording.flipped,
+        open=(bool(unknown[0]), bool(unknown[1])),
     )
+    if any(case.open) and (case.error.max(axis=1) > case.allowed).any() and case.turned <= NUMERICAL:
+        # The rows alone do not show their noise. The exact motion may leave nothing else.
+        _, _, made = case.fit(exact(case), np.zeros(0), np.zeros(0))
+        white = case.leaves_noise(*made)
+        if white.any() and (white | (case.errors(*made).max(axis=1) <= case.allowed)).all():
+            left = np.sqrt((case.errors(*made) ** 2).mean(axis=1) / 3)
+            noise = np.where(white, left, noise)
+            allowed, resolved = allow(rounded, noise, error), np.logical_or(resolved, white)
+            case = replace(case, allowed=allowed.errors, noise=allowed.noise, open=(False, False))
     return Rows(recording, case, allowed, noise, resolved, notes)
 
 
@@ -212,7 +223,8 @@ def _find_noise(
         (R, w), (a, b) = truth(scene, start, t[:n] + shift), take_rows(data, slice(0, n))
         rest: States = None if a is None else np.swapaxes(R, 1, 2) @ a, None if b is None else b - w
         if all(x is None or np.isfinite(x).all() for x in (*rest, R, w)):
-            motion, other = estimate_noise(t[:n], (R, w))[0], estimate_noise(t[:n], rest)
+            moving = w, np.gradient(w, t[:n], axis=0)
+            motion, other = estimate_noise(t[:n], (R, w))[0], estimate_noise(t[:n], rest, moving)
             slow = float(np.median(np.diff(t))) * scale < QUARTER
             # The estimate from the exact motion contains no noise. An estimate that is clearly larger is noise.
             resolved &= (motion < 0.3 * noise) | (noise < TINY)

@@ -17,12 +17,12 @@ from conservative.number_text import number
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
-from ..compare import FEWEST_FOR_NOISE, SIGMAS, UNITS_OF_DIGITS, Compared
+from ..compare import FEWEST_FOR_NOISE, MOST_NOISE, SIGMAS, UNITS_OF_DIGITS, Compared
 from ..explain import Diagnosis, diagnose, fit_moments
 from ..explanation import Explanation
 from ..finding import Cause, Finding, Verdict, Verification, uncapitalised
 from ..mistakes import BY_KEY
-from .comparison import MOST_NOISE, Comparison, compare, prepare
+from .comparison import Comparison, compare, prepare
 from .describe import Description, at_rest, only_noise, unseen
 from .rows import OUTSIDE, REPEATED
 from .table import Recording
