@@ -26,7 +26,7 @@ from .planted.layouts import LAYOUTS
 
 PUBLISHED = range(10_000, 11_000)
 """Seeds of the page, which nobody saw before the last changes of the verification."""
-QUICK = (0, 1, 2, 3)
+QUICK = (2, 7, 13, 15, 17, 21, 25, 29, 30, 45, 53, 63, 67, 75, 89, 92, 96, 113, 116, 135, 142, 149, 154, 157, 163)
 """Seeds of quick files of many kinds."""
 SEVERE = (
     "right files called wrong",
@@ -36,7 +36,7 @@ SEVERE = (
 )
 
 
-@pytest.mark.parametrize("seed", sampled(QUICK, 25))
+@pytest.mark.parametrize("seed", QUICK)
 def test_files_with_and_without_a_mistake_are_judged_as_was_decided(seed, tmp_path):
     row = run.outcome(seed, tmp_path)
     assert not row["complaint"], run.line_of(row)
