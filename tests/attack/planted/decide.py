@@ -26,6 +26,8 @@ NEAR = 0.2
 """Largest difference, rad or relative, with which fits begin."""
 FEWEST, ENOUGH = 12, 8
 """Smallest number of rows of a fit, and of rows that determine a mistake."""
+ENOUGH_FOR_NOISE = 30
+"""Smallest number of rows that show how large their noise is."""
 CLOSE = 300.0
 """Difference, in grains, above which another mistake is not taken for a long step, or for times that scatter."""
 SMALL, MOST = 1e-6, 8
@@ -163,7 +165,9 @@ def rows_of(made: Any, t: Any, Y: Any) -> Rows:
 def decide(made: Any, t: Any, Y: Any) -> None:
     """Decide whether a file is right, whether its mistake is identifiable, and which others make the same rows."""
     made.expected = "right" if made.kind == "right" else "wrong"
-    if made.kind == "right" or len(t) < 2:
+    if made.noise.startswith("1e") and len(t) < ENOUGH_FOR_NOISE:
+        made.expected, made.reason = "", "too few rows to know their noise"
+    if made.kind == "right" or made.reason:
         return
     if made.mistake == "time in ms":
         made.identifiable, made.size = made.about["turns"] > 0.5, np.inf
