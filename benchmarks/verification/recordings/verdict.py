@@ -213,9 +213,7 @@ def verify_recording(
         explained = diagnose(whole, recording.layout.attitude in (None, "quaternion"), tell)
     # Numbers that are fitted to rows that a start can explain as well prove nothing.
     decided = comparison.passed or comparison.outliers or comparison.case.far
-    unclear = ""
-    if not decided and error is None:
-        unclear = CUT if rows.case.effort.over else HIDDEN if comparison.case.hidden() else ""
+    unclear = "" if decided or error is not None else _unclear(comparison.case)
     proven = [explanation for explanation in explained.named if explanation.explains and not (unclear and explanation.numbers)]
     verdict, doubt = Verdict.WRONG, ""
     if comparison.passed and shaped:
@@ -361,6 +359,11 @@ def _single_rows(comparison: Comparison) -> Explanation:
         key, values = "rates at sign changes", {"rows": float(len(times)), "first": float(row)}
     mistake, before = BY_KEY[key], comparison.worst.max(axis=1).tolist()
     return Explanation((key,), mistake.sentence.format(**values), values, [0.0, 0.0], before, 0.0, 0.0, True)
+
+
+def _unclear(case: Compared) -> str:
+    """Return the sentence on rows that another start may explain; "" if no start does."""
+    return CUT if case.effort.over else HIDDEN if case.hidden() else ""
 
 
 def _doubt(case: Compared, errors: Array, resolved: Array, recording: Recording) -> str:
