@@ -38,7 +38,7 @@ from .find_steps import PARTS, STEPS_AT_MOST, Linearised, by_step, find_steps
 from .mistakes import BY_KEY
 from .mistakes.attitudes import DRIFTS, RULES, Drift, align, integrate
 from .mistakes.equations import EQUATIONS
-from .mistakes.habits import HABITS, PART_STANDSTILLS, ROWS, STANDSTILLS, Standstill
+from .mistakes.habits import HABITS, PART_STANDSTILLS, ROWS, STANDSTILLS, Habit, Standstill
 from .mistakes.mistake import Number
 from .mistakes.readings import ATTITUDES, AXES, RATES, READINGS, Reading
 from .mistakes.scenes import PARTS as SCENE_PARTS
@@ -64,6 +64,8 @@ SHRUNK = 1e-3
 """A motion in other units of time that moves by less than this share of the exact motion stands still."""
 SHOWN = 10.0
 """A motion in other units of time that moves by less than this number of allowed errors shows nothing."""
+AFTER_ERROR, STEPS_OF_HABITS = 12, (*range(1, 13), 15, 16, 20, 24, 25, 30, 40, 50)
+"""Rows from the first error on from which the step of a habit is found, and the steps between two rows that are tried."""
 NEARLY, SMALL_SHARE, REFINED = 1e-2, 1e-6, 2
 """Largest share of the error that an integrator leaves if sizes of numbers of the scene are fitted to the rest, the change of a
 number for slopes, and the number of such fits."""
@@ -397,7 +399,10 @@ def _by_own_times(case: Compared, gap: float, end: float) -> Explanation | None:
     if lost.max() >= 1 and np.abs(off - lost * gap).max() < 0.2 * gap and (np.diff(lost) >= 0).all():
         at = float(case.t[np.flatnonzero(lost)[0]])
         values = {"rows": float(lost.max()), "at": at}
-        return explain(case, Trial((DROPPED,), _nowhere), sample(case.t + lost * gap), values, numbers=2)
+        later = replace(case, t=case.t + lost * gap)
+        if case.free and not later.passes(later.error):  # the start was fitted to times that are wrong
+            later = later.at(later.fit(exact(later), np.zeros(0), np.zeros(0))[0])
+        return explain(case, Trial((DROPPED,), _nowhere), later.exact, values, numbers=2)
     if abs(float(np.mean(off))) < 0.5 * size:
         # Every row has a time of its own: this ranks behind explanations by one or two fitted numbers.
         return explain(case, Trial((JITTERED,), _nowhere), sample(tau), {"jitter": size}, numbers=3)
@@ -535,20 +540,31 @@ def _habits(case: Compared, asked: _Asked) -> Explanations:
         if not numbers:
             continue
         known = dict(zip((number.name for number in habit.numbers), numbers, strict=True))
-        explanations = list[Explanation]()
-        for parts in (1, 2, 5, 10) if case.step is None else (1,):
-            step = case.step or float(np.median(np.diff(case.t))) / parts
-            # Up to the first row with an error (0 if there is none), and 30 rows more.
-            first = case.take(slice(0, int(np.flatnonzero(case.error.max(axis=0) > case.allowed.min())[:1].sum()) + 30))
-            for some in (first, case) if len(first.t) < len(case.t) and len(first.t) > 3 else (case,):
-                explanation = attempt(some, _at_numbers(by_habit(habit, step), numbers), known=known)
-                if explanation is None or explanation.share > 0.5 or some is case:
-                    break
+        for step in _steps_of(case, habit, known):
+            explanation = attempt(case, _at_numbers(by_habit(habit, step), numbers), known=known)
             if explanation is not None:
-                explanations.append(replace(explanation, trial=by_habit(habit, step), numbers=len(numbers)))
-                if explanation.explains:
-                    break
-        yield from explanations
+                yield replace(explanation, trial=by_habit(habit, step), numbers=len(numbers))
+
+
+def _steps_of(case: Compared, habit: Habit, known: Mapping[str, float]) -> list[float]:
+    """Return the step, s, with which a habit explains most of a few rows from the first error on; [] if it explains little."""
+    if case.step is not None:
+        return [case.step]
+    k = int(np.flatnonzero((case.error > case.allowed[:, None]).any(axis=0))[:1].sum())
+    begin, gap = max(0, k - 2), float(np.median(np.diff(case.t)))
+    R, w = (x[begin] for x in case.exact)
+    some = case.take(slice(begin, k + AFTER_ERROR))
+    some = replace(some, scene=some.scene.rename("rows", R_WB0=R, w_WB_B0=w), start=float(some.t[0]), free=())
+    best = HALF, 0
+    for parts in STEPS_OF_HABITS:
+        trial = _at_numbers(by_habit(habit, gap / parts), tuple(known.values()))
+        explanation = attempt(some, trial, known=known, ranked=True)
+        if explanation is None or case.effort.over or (best[1] and parts > 3 * best[1]):
+            break
+        best = min(best, (explanation.share, parts))
+        if explanation.explains:
+            break
+    return [gap / best[1]] if best[1] else []
 
 
 def _at_numbers(trial: Trial, numbers: tuple[float, ...]) -> Trial:

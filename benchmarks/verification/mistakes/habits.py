@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -80,15 +80,17 @@ def limit(w: Array, most: float) -> Array:
     return w * np.minimum(1.0, most / np.maximum(speed, 1e-300))
 
 
-def _equal(values: Array, most: float) -> Any:
-    """Return which values equal the largest to a part in 1,000, so that few digits in a file do not hide the limit."""
-    return np.abs(values - most) <= 1e-3 * most
-
-
 def _guess_limit(sizes: Array, before: Array) -> tuple[float, ...]:
-    """Return the largest size, if larger ones were cut to it in two or more rows."""
-    cut = (before > sizes * (1 + 1e-9)) & _equal(sizes, sizes.max())  # larger by more than round-off
-    return (float(np.median(sizes[cut])),) if cut.sum() >= 2 else ()
+    """Return the largest size, if larger ones were cut to it in two or more rows.
+
+    Few digits in a file do not hide the limit: sizes that equal the largest to a part in 1,000 at most count.
+    """
+    larger = before > sizes * (1 + 1e-9)  # by more than round-off
+    for share in (1e-7, 1e-6, 1e-5, 1e-4, 1e-3):
+        cut = larger & (np.abs(sizes - sizes.max()) <= share * sizes.max())
+        if cut.sum() >= 2:
+            return (float(np.median(sizes[cut])),)
+    return ()
 
 
 def _guess_band(w: Array, before: Array) -> tuple[float, ...]:
