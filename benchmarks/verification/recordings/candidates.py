@@ -136,7 +136,8 @@ def decide_sets(
         key=lambda pair: pair[0],
     )
     if ranked[0][0] > AGREES or ranked[1][0] * BETTER < ranked[0][0]:
-        return [readings[i] for off, i in ranked if off <= AGREES or ranked[0][0] > AGREES]
+        agreeing = [readings[i] for off, i in ranked if off <= AGREES]
+        return agreeing if len(agreeing) > 1 else readings
     best = readings[ranked[0][1]]
     open_ = [kind for kind in best if any(reading[kind] != best[kind] for reading in readings)]
     for kind in open_:
