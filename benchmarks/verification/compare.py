@@ -57,6 +57,10 @@ PERTURBED = 1e-8, 1e-12
 """Changes of initial states that show how the motion multiplies them. The second is used where the first becomes large."""
 STRAIGHT, NARROWED = 0.03, 6
 """Largest difference of motions from which slopes are computed, and the number of trials with smaller changes."""
+MOST_NOISE = 0.05
+"""Largest noise, rad or relative to the largest rate. Larger differences of rows are motion."""
+MOSTLY_ALONG = 0.9
+"""Median cosine between differences and the motion from which they are errors of times; 0.5 for noise."""
 CONVERGED = 1e-3
 """Share of the sum of squares by which a step of a fit that has converged improves it."""
 SMALLEST_CHANGE = 1e-14
@@ -147,7 +151,8 @@ class Compared:
     the factor by which the motion multiplies an error of the first row, and every `stride`-th row is here. `effort` is
     the work that a search may still do. `rounded` are the errors that digits make; with an allowed error of the user, which
     alone decides, this one. `step` is the step of a program, s; None if it is not known. `flipped` (n,) is True in rows in
-    which the quaternion of the file changes its sign; None if the file has no quaternions.
+    which the quaternion of the file changes its sign; None if the file has no quaternions. `open` says for attitudes and rates
+    whether the rows do not show their noise: what a motion leaves there may be noise.
     """
 
     scene: Scene
@@ -164,6 +169,7 @@ class Compared:
     rounded: tuple[float, float] = (0.0, 0.0)
     step: float | None = None
     flipped: Any = None
+    open: tuple[bool, bool] = (False, False)
 
     @property
     def from_row(self) -> bool:
@@ -270,6 +276,16 @@ class Compared:
         """The angle, rad, by which the body may have turned."""
         return float(self.t[-1] - self.start) * self.scale
 
+    @property
+    def gap(self) -> float:
+        """The angle, rad, by which the body turns from row to row."""
+        return float(np.median(np.diff(self.t))) * self.scale
+
+    @property
+    def far(self) -> bool:
+        """Whether the body turns by more from row to row than trial motions do in all."""
+        return self.gap > NUMERICAL
+
     @cached_property
     def plain(self) -> Array:
         """The errors (2, n) without a mistake: from the first row, or from a start that is fitted if it has noise."""
@@ -305,16 +321,29 @@ class Compared:
         most = np.where(noisy, 1.3 * np.sqrt(3) * (1 + 3 / np.sqrt(n)) * self.noise, self.allowed)
         return bool((error.max(axis=1) <= self.allowed).all() and (mean <= most).all())
 
+    def leaves_noise(self, R: Array, w: Array) -> Array:
+        """Return for attitudes and rates (2,) whether their noise is open, and a motion leaves differences that are noise."""
+        a, b = (y if x is None else x for x, y in zip(self.data, (R, w), strict=True))
+        left, moved = differ(R, w, a, b, self.scale), np.gradient(w, self.t, axis=0) if len(self.t) > 1 else 0 * w
+        return np.array([
+            open_ and x is not None and is_noise(left[:, part], along)
+            for open_, x, part, along in zip(self.open, self.data, (slice(3), slice(3, 6)), (w, moved), strict=True)
+        ])  # fmt: skip
+
     def size(self, error: Array) -> float:
         """Return the root of the mean square of errors, in units of the noise."""
         return float(np.sqrt((error**2).mean(axis=1) / self.noise**2).max())
 
+    def work(self, bodies: int) -> float:
+        """Return the work (`Effort`) of a number of motions over the rows."""
+        corners = int(np.searchsorted(self.scene.breaks, self.t[-1])) if len(self.scene.breaks) else 0
+        stretches = 1 + self.turned / ANGLE + corners
+        return weigh(self.scene) * stretches * (1 + bodies) / 2 + bodies * len(self.t) / ROWS_OF_EFFORT
+
     def evaluate(self, motion: Solution, many: Array) -> tuple[Array, Array]:
         """Return motions (B, n, 3, 3), (B, n, 3) of changes of the initial state and other numbers, (B, 6 + k)."""
         turns = Rotation.from_rotvec(many[:, :3]).as_matrix()
-        corners = int(np.searchsorted(self.scene.breaks, self.t[-1])) if len(self.scene.breaks) else 0
-        stretches, bodies = 1 + self.turned / ANGLE + corners, len(many)
-        self.effort.spend(weigh(self.scene) * stretches * (1 + bodies) / 2 + bodies * len(self.t) / ROWS_OF_EFFORT)
+        self.effort.spend(self.work(len(many)))
         return motion(self.scene.R_WB0 @ turns, self.scene.w_WB_B0 + many[:, 3:6] * self.scale, many[:, 6:], len(self.t))
 
     def equations(self, scene: Scene | None = None, gyroscopic: float = 1.0, **changes: Any) -> Equations:
@@ -334,7 +363,7 @@ class Compared:
         R, w = self.evaluate(motion, numbers + small * np.vstack([0 * numbers, np.eye(len(numbers))[moved]]))
         d = (self.differences(R, w) / np.repeat(self.noise, [9, 3])).reshape(1 + len(moved), -1)
         slopes, out = (d[1:] - d[0]) / small, np.zeros(len(numbers))
-        out[moved] = np.sqrt(np.diag(np.linalg.pinv(slopes @ slopes.T)))
+        out[moved] = np.sqrt(np.maximum(np.diag(np.linalg.pinv(slopes @ slopes.T)), 0.0))
         return out
 
     def fit(self, motion: Solution, extra: Array, changed: Array, most: int = 8) -> tuple[Array, Array, tuple[Array, Array]]:
@@ -352,6 +381,8 @@ class Compared:
         # More and more rows: a motion that multiplies small changes is not linear in its start over all rows.
         rows = [n] if not free else [k for k in (n // 64, n // 16, n // 4) if k >= 8] + [n]
         for k in rows if moved else ():
+            if self.take(slice(0, k)).work(len(moved)) > self.effort.left:
+                break
             p, cost = self._improve(motion, p, k, moved, small, most)
             if free and cost > k * max(HOPELESS, (self.allowed / self.noise).max()) ** 2:
                 break  # no start explains these rows, so none explains more
@@ -386,7 +417,7 @@ class Compared:
             axes, triangle = np.linalg.qr(slopes.T)  # normal equations would square how much the motion multiplies
             sizes = np.diag(np.linalg.norm(slopes, axis=1) + 1e-150)
             goal = np.concatenate([-axes.T @ now, np.zeros(len(moved))])
-            while damping < 1e3 and not better:  # a larger damping makes steps of no use
+            while damping < 1e3 and not better and not self.effort.over:  # a larger damping makes steps of no use
                 step = np.linalg.lstsq(np.vstack([triangle, np.sqrt(damping) * sizes]), goal, rcond=1e-15)[0]
                 q = p.copy()
                 q[moved] += step
@@ -480,7 +511,8 @@ def differ(R0: Array, w0: Array, R: Array, w: Array, scale: float) -> Array:
     turn = np.nan_to_num(np.swapaxes(R0, -1, -2) @ R) + 0.0
     turn[np.abs(np.linalg.det(turn)) < 0.5] = np.eye(3)
     vector = Rotation.from_matrix(turn.reshape(-1, 3, 3)).as_rotvec().reshape(*turn.shape[:-2], 3)
-    return np.concatenate([vector, np.nan_to_num(w - w0) / scale], axis=-1)
+    with np.errstate(over="ignore"):
+        return np.concatenate([vector, np.clip(np.nan_to_num(w - w0) / scale, -HUGE, HUGE)], axis=-1)
 
 
 def count_linear(differences: Array) -> int:
@@ -516,11 +548,47 @@ def exact(case: Compared) -> Solution:
     return motion
 
 
-def estimate_noise(t: Array, data: States) -> tuple[Array, Array]:
+def is_noise(left: Array, along: Array) -> bool:
+    """Return whether differences (n, 3) from a motion are noise: small, white, of one size at all times and in all directions.
+
+    `along` (n, 3) is the direction in which errors of times lie.
+    """
+    n = len(left)
+    if n < FEWEST_FOR_NOISE or not np.isfinite(left).all():
+        return False
+    power = float((left * left).sum())
+    size = math.sqrt(power / (3 * n))
+    if not 0 < size <= MOST_NOISE or np.abs(left).max() > SIGMAS * size:
+        return False
+    off = float(np.linalg.norm(left.mean(axis=0))) / size
+    lags = [abs(float((left[k:] * left[:-k]).sum())) / power for k in range(1, min(20, n // 4) + 1)]
+    halves = sorted(float((part * part).sum()) for part in (left[: n // 2], left[-(n // 2) :]))
+    spread = np.linalg.eigvalsh(left.T @ left)
+    return bool(
+        off < 5 / math.sqrt(n)
+        and max(lags) < max(0.25, 4 / math.sqrt(3 * n))
+        and halves[1] < (2 + 12 / math.sqrt(n)) * halves[0]
+        and spread[0] > 0.05 * spread[-1]
+        and not lies_along(left, along)
+    )
+
+
+def lies_along(left: Array, along: Array) -> bool:
+    """Return whether most differences (n, 3) lie along directions (n, 3). A third of them does by chance."""
+    sizes = np.linalg.norm(left, axis=1) * np.linalg.norm(along, axis=1)
+    some = sizes > 0
+    if np.linalg.matrix_rank(left, tol=1e-9 * (np.abs(left).max() or 1.0)) < 2 or some.sum() < len(left) / 2:
+        return False  # differences in one direction show nothing
+    cosines = np.abs((left * along).sum(axis=1))[some] / sizes[some]
+    return bool(np.median(cosines) > MOSTLY_ALONG)
+
+
+def estimate_noise(t: Array, data: States, along: States = (None, None)) -> tuple[Array, Array]:
     """Return the noise (2,) of attitudes, rad, and rates, rad/s, of one axis, and whether the rows are close enough to tell.
 
     It is the smallest robust estimate from differences of order 3 to 9. Differences of a smooth motion fall with each order,
-    and differences of noise do not.
+    and differences of noise do not. Differences along the motion are of times, and no noise: `along` are directions (n, 3) of
+    the motion, by default of the data.
     """
     noise, resolved = np.zeros(2), np.zeros(2, bool)
     for i, (values, size) in enumerate(zip(data, (2.0, 1.0), strict=True)):
@@ -540,5 +608,16 @@ def estimate_noise(t: Array, data: States) -> tuple[Array, Array]:
             # 1.538: the median norm of three normal numbers.
             estimates.append(size * float(np.median(np.linalg.norm(d, axis=1))) / 1.538)
         noise[i] = min(estimates)
-        resolved[i] = estimates[-1] > 0.5 * estimates[-3] or noise[i] < TINY
+        # Held rows and stamps that are off change the rows along the motion, and noise in all directions.
+        middle, direction = slice(4, 4 + len(d)), along[i]
+        forward = x[5 : 5 + len(d)] - x[3 : 3 + len(d)] if direction is None else direction[middle]
+        if i == 0:
+            d, forward = _turn_of(x[middle], d), _turn_of(x[middle], forward) if direction is None else forward
+        resolved[i] = (estimates[-1] > 0.5 * estimates[-3] and not lies_along(d, forward)) or noise[i] < TINY
     return noise, resolved
+
+
+def _turn_of(q: Array, change: Array) -> Array:
+    """Return the small turns (n, 3) in body axes, up to their size, of changes (n, 4) of quaternions."""
+    a, v, b, u = q[:, :1], q[:, 1:], change[:, :1], change[:, 1:]
+    return a * u - b * v - np.cross(v, u)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from conservative.attitude import Array, to_quaternion
+from conservative.attitude import Array, from_quaternion, to_quaternion
 from conservative.scene import Scene
 
 from .compare import HOPELESS, LINEAR, Compared, Solution, differ, linearise, weigh
@@ -23,6 +23,8 @@ ROWS, STEP_EFFORT = 400, 1.0
 """Largest number of rows that candidates are compared with, and the work of one step from all of them."""
 STEPS_AT_MOST, PARTS = 20_000, 2000
 """Largest numbers of steps of a method, over the file and between two rows."""
+CLOSE = 1e-7
+"""Time between two values of a motor for its slope, relative, if it is a function."""
 MOST_KEPT = 50_000
 """Largest number of times whose loads are kept."""
 CANDIDATES = 5
@@ -35,29 +37,75 @@ FIRST_STEPS = 2000
 class Slope:
     """The derivative of states (7, n), at one time or at a time for each of them, s.
 
-    Loads at one time are kept: a method runs many times, with other initial states, over the same times.
+    A state is a quaternion and rates, as simulators have it: a motor acts by its torque -h' at the times of the method, where
+    `Equations` integrate its momentum. Loads at one time are kept: a method runs many times over the same times.
     """
 
     equations: Equations
-    known: dict[float, Derivative] = field(default_factory=dict)
+    known: dict[float, tuple[Derivative, Array, Array]] = field(default_factory=dict)
 
     @property
     def body(self) -> Any:
         return self.equations.scene.body
 
+    def rotor(self, t: Any) -> Any:
+        """Return the momentum (3, n) or (3, 1) of the rotor, kg m^2/s; 0 without one."""
+        if self.body.motor is not None:
+            return np.array([self.body.motor.at(time) for time in np.atleast_1d(t).tolist()]).T
+        return np.zeros((3, 1)) if self.body.rotor_momentum is None else self.body.rotor_momentum[:, None]
+
     def rates(self, t: Any, y: Array) -> Array:
         """Return the angular velocities (3, n) of states."""
-        return y[4:] if self.body.motor is None else y[4:] - self.equations.wheel(np.atleast_1d(t))
+        return y[4:]
 
     def __call__(self, t: Any, y: Array) -> Array:
         if np.ndim(t):
-            return self.equations.at(np.asarray(t))(y[:, None])[:, 0]
+            derivative, wheel, faster = self._at(np.asarray(t))
+            return self._apply(derivative, wheel, faster, y[:, None])[:, 0]
         t = 0.0 if self.equations.steady else float(t)
         if t not in self.known:
             if len(self.known) > MOST_KEPT:
                 self.known.clear()
-            self.known[t] = self.equations.at(np.array([t]))
-        return self.known[t](y[:, :, None])[:, :, 0]
+            self.known[t] = self._at(np.array([t]))
+        return self._apply(*self.known[t], y[:, :, None])[:, :, 0]
+
+    def _at(self, t: Array) -> tuple[Derivative, Array, Array]:
+        """Return the derivative at times (n,), s, and J^-1 h and J^-1 h' (3, n) of a motor."""
+        nothing = np.zeros((3, 1))
+        if self.body.motor is None:
+            return self.equations.at(t), nothing, nothing
+        changes = np.array([slope_of_motor(self.body.motor, time) for time in t.tolist()])
+        return self.equations.at(t), self.equations.wheel(t), self.equations.reaction * (self.body.inverse @ changes.T)
+
+    def _apply(self, derivative: Derivative, wheel: Array, faster: Array, y: Array) -> Array:
+        if self.body.motor is None:
+            return derivative(y)
+        moved, shape = y.copy(), (3, 1, -1) if y.shape[1] == 1 else (3, -1, 1)
+        moved[4:] += wheel.reshape(shape)
+        out = derivative(moved)
+        out[4:] -= faster.reshape(shape)
+        return out
+
+
+def slope_of_motor(motor: Any, t: float) -> Array:
+    """Return the change (3,) of a motor's momentum at a time and just after it, N m."""
+    if isinstance(motor.value, tuple):
+        times, values = motor.value
+        k = int(np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(times) - 2))
+        return np.asarray((values[k + 1] - values[k]) / (times[k + 1] - times[k]))
+    e = CLOSE * max(abs(t), 1.0)
+    return np.asarray((motor.at(t + e) - motor.at(t)) / e)
+
+
+def pack(R: Array, w: Array) -> Array:
+    """Return the states (7, n) of attitudes (n, 3, 3) and rates (n, 3)."""
+    return np.concatenate([to_quaternion(R).T, w.T])
+
+
+def unpack(y: Array) -> tuple[Array, Array]:
+    """Return attitudes (..., 3, 3) and rates (..., 3) of states (7, ...)."""
+    q = y[:4] / np.sqrt((y[:4] * y[:4]).sum(axis=0))
+    return from_quaternion(np.moveaxis(q, 0, -1)), np.moveaxis(y[4:], 0, -1)
 
 
 @lru_cache(maxsize=4)
@@ -69,10 +117,10 @@ def slope_of(scene: Scene) -> Slope:
 def march(case: Compared, method: Step, parts: int) -> Solution:
     """Return the motion by a method with `parts` steps between two rows, which are equally far apart."""
     f, weight = slope_of(case.scene), weigh(case.scene)
-    equations, h = f.equations, float(case.t[-1] - case.start) / (count_gaps(case)[-1] * parts)
+    h = float(case.t[-1] - case.start) / (count_gaps(case)[-1] * parts)
 
     def motion(R: Array, w: Array, _: Array, n: int) -> tuple[Array, Array]:
-        y, past, kept, numbers = equations.pack(case.start, R, w), list[Array](), list[Array](), count_gaps(case)[:n] * parts
+        y, past, kept, numbers = pack(R, w), list[Array](), list[Array](), count_gaps(case)[:n] * parts
         last, wanted = int(numbers[-1]), set(numbers.tolist())
         with np.errstate(all="ignore"):
             for number in range(last + 1):
@@ -89,7 +137,7 @@ def march(case: Compared, method: Step, parts: int) -> Solution:
                     y = new
                     if method.normalised:
                         y[:4] /= np.sqrt((y[:4] * y[:4]).sum(axis=0))
-            return equations.states(np.stack(kept, axis=2), case.t[:n])
+            return unpack(np.stack(kept, axis=2))
 
     return motion
 
@@ -197,11 +245,11 @@ class Linearised:
             self.made[id(method), parts] = errors = differ(self.R[:n], self.w[:n], R[0], w[0], case.scale)
             return errors
         t, h = case.t[: n - 1], float(case.t[n - 1] - case.t[0]) / (n - 1) / parts
-        y = np.concatenate([to_quaternion(self.R[: n - 1]).T, self.w[: n - 1].T + self.equations.wheel(t)])
+        y = pack(self.R[: n - 1], self.w[: n - 1])
         past: list[Array] = []
         for back in range(1, method.past + 1):
             a, b = truth(case.scene, case.start, np.maximum(t - back * h, case.start))
-            past.append(np.concatenate([to_quaternion(a).T, b.T + self.equations.wheel(t)]))
+            past.append(pack(a, b))
             past[-1][:4] *= np.sign((past[-1][:4] * y[:4]).sum(axis=0))
         first, before = y[:, :1], list[Array]()  # a method begins without a past
         with np.errstate(all="ignore"):
@@ -212,8 +260,8 @@ class Linearised:
                     new = method.next(self.f, t[:1] + number * h, first, h, before)
                     first, before = new, [first, *before][: method.past]
             y[:, :1] = first if method.past else y[:, :1]
-            a, b = self.equations.states(y[:, None], case.t[1:n])
-        defect = differ(self.R[1:n], self.w[1:n], a[0], b[0], case.scale)
+            a, b = unpack(y)
+        defect = differ(self.R[1:n], self.w[1:n], a, b, case.scale)
         carried = np.cumsum((self.inverse[1:n] @ defect[..., None])[..., 0], axis=0)
         errors = np.concatenate([np.zeros((1, 6)), (self.flow[1:n] @ carried[..., None])[..., 0]])
         self.made[id(method), parts] = errors
@@ -284,10 +332,10 @@ class RowByRow(Linearised):
             return np.zeros((self.used - 1, 6))
         if (id(method), parts) not in self.made:
             self.case.effort.spend(STEP_EFFORT * parts)
-            y = self.equations.pack(0.0, self.R[:-1], self.w[:-1])
+            y = pack(self.R[:-1], self.w[:-1])
             with np.errstate(all="ignore"):
                 for _ in range(parts):
                     y = method.next(self.f, 0.0, y, self.gap / parts, [])
-                a, b = self.equations.states(y[:, :, None], np.zeros(1))
-            self.made[id(method), parts] = differ(*self.exact, a[:, 0], b[:, 0], self.case.scale)
+                made = unpack(y)
+            self.made[id(method), parts] = differ(*self.exact, *made, self.case.scale)
         return self.made[id(method), parts]

@@ -141,6 +141,8 @@ def _at_times(
     t = case.t[:n] - case.start
     gap = float(np.median(np.diff(case.t)))
     end = float(case.t[-1] + 0.1 * (case.t[-1] - case.start) + 2 * gap)
+    if 0 < time.unit < 1:  # in the unit of the file, the motion may have any number of turns
+        end = case.start + (end - case.start) * time.unit
     if case.free or not flows:
         flows[:] = [equations.flow(case.start, R, w, end)]
     of_attitudes, of_rates = (

@@ -14,17 +14,11 @@ LISTED = 12
 
 
 def recording_blocks(verification: Verification) -> list[Block]:
-    """Return the blocks on a recording that follow the sentence of its verdict: noise, mistakes, quantities, columns."""
+    """Return the blocks on a recording that follow the sentence of its verdict: start, mistakes, quantities, columns."""
     details = verification.details
     assert isinstance(details, Details)
-    (finding,) = verification.findings
-    sentences = []
-    if finding.by == "noise" and max(details.noise) > 0:
-        sentence = f"The noise of an axis is {details.show(details.noise)}"
-        if max(details.first_row) > 0:
-            sentence += f"; from the first row alone the motion is off by {details.show(details.first_row)}"
-            sentence += ", so its start is fitted"
-        sentences.append(f"{sentence}.")
+    fitted = max(details.first_row) > 0
+    first_row = f"From the first row alone the motion is off by {details.show(details.first_row)}, so its start is fitted."
     proven, candidates = details.explaining, details.candidates
     # A single mistake is in the sentence of the verdict already.
     left = [
@@ -43,7 +37,7 @@ def recording_blocks(verification: Verification) -> list[Block]:
     quantities = [[quantity.name, bound(quantity.largest), bound(quantity.final)] for quantity in details.quantities]
     tried = [] if proven else [[explanation.name, details.show(explanation.left)] for explanation in details.tried[:LISTED]]
     return filled(
-        Paragraph(" ".join(sentences)) if sentences else None,
+        Paragraph(first_row) if fitted else None,
         Paragraph(heading) if heading else None,
         Items.of(left if heading else []),
         Table(["quantity", "largest", "at the end"], quantities),
@@ -52,11 +46,17 @@ def recording_blocks(verification: Verification) -> list[Block]:
     )
 
 
+def described(verification: Verification) -> list[Block]:
+    """Return the paragraphs on what a recording is."""
+    assert isinstance(verification.details, Details)
+    return [Paragraph(line) for line in verification.details.lines]
+
+
 def two_blocks(verification: Verification) -> list[Block]:
     """Return a section for each of two recordings, with its blocks."""
     details = verification.details
     assert isinstance(details, Two)
     return [
-        Section(f"{recording.subject}: {recording.verdict}", recording_blocks(recording))
+        Section(f"{recording.subject}: {recording.verdict}", [*described(recording), *recording_blocks(recording)])
         for recording in (details.first, details.second)
     ]

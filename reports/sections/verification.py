@@ -14,7 +14,7 @@ from conservative.benchmarks.verification.finding import EXIT_CODES, Cause, Find
 from ..document.cells import DASH, bound, listed
 from ..document.model import Block, Cell, Check, Document, Emphasis, Grade, Item, Items, Paragraph, Row, Section, Table, filled
 from .bodies import body_blocks
-from .recording import recording_blocks, two_blocks
+from .recording import described, recording_blocks, two_blocks
 
 Key = TypeVar("Key")
 SIGNS = {
@@ -44,7 +44,8 @@ MODEL = "model file"
 def build(verifications: Sequence[Verification], made: Mapping[str, str] | None = None) -> Document:
     """Return the document of verifications, which were made with the versions in `made`.
 
-    Its first line is the verdict. The terminal shows what decides it; other formats also have every case.
+    Its first line is the verdict. Two lines on what a recording is precede the verdict on one. The terminal shows what decides;
+    other formats also have every case.
     """
     order = sorted(verifications, key=lambda verification: DECIDING.index(verification.verdict))
     models, others = (
@@ -59,7 +60,8 @@ def build(verifications: Sequence[Verification], made: Mapping[str, str] | None 
         )
         for verification in listed_alone
     ]
-    lead = filled(Paragraph(_sentence(order), Emphasis.LEAD), Items(sentences) if len(order) > 1 else None)
+    before = described(order[0]) if len(order) == 1 and order[0].kind == "recording" else []
+    lead = filled(*before, Paragraph(_sentence(order), Emphasis.LEAD), Items(sentences) if len(order) > 1 else None)
 
     def blocks(make: Callable[[Verification], list[Block]], shown: Sequence[Verification]) -> list[Block]:
         parts = [

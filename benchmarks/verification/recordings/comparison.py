@@ -18,12 +18,14 @@ from ..compare import (
     FEWEST_FOR_NOISE,
     FLOOR,
     HOPELESS,
+    MOST_NOISE,
     NUMERICAL,
     SIGMAS,
     TINY,
     UNITS_OF_DIGITS,
     Allowed,
     Compared,
+    Effort,
     allow,
     estimate_noise,
     exact,
@@ -34,10 +36,10 @@ from ..solution import States, has_closed_form, truth
 from .table import Recording
 from .units import no_unit
 
-MOST_NOISE = 0.05
-"""Largest noise, rad or relative to the largest rate. Larger differences of rows are motion."""
 ROUND_OFF = 2e-15
 """Error of an exact motion, rad."""
+EFFORT = 6000
+"""Work of the fits of the start, before a mistake is searched for: about 2 s of an idle core."""
 ROWS_OF_NOISE = 4000
 """Largest number of rows from which noise is estimated."""
 CLEARLY = 2.0
@@ -94,7 +96,9 @@ def prepare(scene: Scene, recording: Recording, from_row: bool, error: float | N
     rounded = _rounded(recording, t, rates, scale)
     noise, resolved = _find_noise(scene, recording, start, float(t[0]) - first, scale, allow(rounded).errors)
     allowed = allow(rounded, noise, error)
-    inexact = from_row and bool((rounded > 1e-13).any() or (noise > 1e-11).any())
+    have = np.array([R is not None, w is not None])
+    unknown = have & np.logical_not(resolved) & (len(t) >= FEWEST_FOR_NOISE and error is None)
+    inexact = from_row and bool((rounded > 1e-13).any() or (noise > 1e-11).any() or unknown.any())
     free = [*range(3)] * (R is not None) + [*range(3, 6)] * (w is not None)
     case = Compared(
         scene,
@@ -107,7 +111,18 @@ def prepare(scene: Scene, recording: Recording, from_row: bool, error: float | N
         tuple(free) if inexact else (),
         rounded=tuple(allowed.rounded.tolist()),
         flipped=recording.flipped,
+        open=(bool(unknown[0]), bool(unknown[1])),
+        effort=Effort(EFFORT),
     )
+    if any(case.open) and (case.error.max(axis=1) > case.allowed).any() and case.turned <= NUMERICAL / 10:
+        # The rows alone do not show their noise. The exact motion may leave nothing else.
+        _, _, made = case.fit(exact(case), np.zeros(0), np.zeros(0))
+        white = case.leaves_noise(*made)
+        if white.any() and (white | (case.errors(*made).max(axis=1) <= case.allowed)).all():
+            left = np.sqrt((case.errors(*made) ** 2).mean(axis=1) / 3)
+            noise = np.where(white, left, noise)
+            allowed, resolved = allow(rounded, noise, error), np.logical_or(resolved, white)
+            case = replace(case, allowed=allowed.errors, noise=allowed.noise, open=(False, False))
     return Rows(recording, case, allowed, noise, resolved, notes)
 
 
@@ -118,7 +133,11 @@ def _begin(scene: Scene, recording: Recording, from_row: bool) -> tuple[Scene, A
     if first < 0 and (timed or not from_row):
         raise BadInput("run", recording.label(f"a first row at {first:g} s"), "times of the scene, from 0 on")
     if timed:  # its loads need values in all rows
-        scene = scene.rename(scene.name, t_end=max(scene.t_end, float(t[-1])))
+        try:
+            scene = scene.rename(scene.name, t_end=max(scene.t_end, float(t[-1])))
+        except BadInput as short:
+            got = recording.label(f"rows until {t[-1]:g} s, and {short.argument}: {short.got}")
+            raise BadInput("run", got, f"rows within the table (--until), or {short.allowed}") from None
     elif from_row:  # sums of steps and a large time would lose digits
         t = t - first
     if from_row:
@@ -180,7 +199,8 @@ def _rounded(recording: Recording, t: Array, rates: Array, scale: float) -> Arra
     time, attitude, rate = recording.digits
     w, acceleration = recording.data[1], 0.0
     if w is not None:
-        slopes = np.linalg.norm(np.diff(w, axis=0), axis=1) / np.diff(t)
+        # Where the body turns by more than 1 rad from row to row, rates have changed by more than the rows show.
+        slopes = np.linalg.norm(np.diff(w, axis=0), axis=1) * np.maximum(1 / np.diff(t), scale)
         acceleration = float(slopes[rates[1:] <= 10 * scale].max(initial=0.0))
     if rate <= 2.0**-52 * rates.max():  # double precision is relative to each row
         rate = min(rate, 2.0**-53 * scale)
@@ -207,7 +227,8 @@ def _find_noise(
         (R, w), (a, b) = truth(scene, start, t[:n] + shift), take_rows(data, slice(0, n))
         rest: States = None if a is None else np.swapaxes(R, 1, 2) @ a, None if b is None else b - w
         if all(x is None or np.isfinite(x).all() for x in (*rest, R, w)):
-            motion, other = estimate_noise(t[:n], (R, w))[0], estimate_noise(t[:n], rest)
+            moving = w, np.gradient(w, t[:n], axis=0)
+            motion, other = estimate_noise(t[:n], (R, w))[0], estimate_noise(t[:n], rest, moving)
             slow = float(np.median(np.diff(t))) * scale < QUARTER
             # The estimate from the exact motion contains no noise. An estimate that is clearly larger is noise.
             resolved &= (motion < 0.3 * noise) | (noise < TINY)
@@ -243,9 +264,8 @@ class Comparison:
 def compare(case: Compared, recording: Recording, from_row: bool) -> Comparison:
     """Compare the rows that are kept for fits, and if they agree, all rows of the file."""
     undecided, shift = "", float(recording.t[0] - case.t[0])
-    gap = float(np.median(np.diff(case.t))) * case.scale
-    if not has_closed_form(case.scene) and gap > NUMERICAL / 10:
-        got = f"rows between which the body turns by {gap:.2g} rad"
+    if not has_closed_form(case.scene) and case.gap > NUMERICAL / 10:
+        got = f"rows between which the body turns by {case.gap:.2g} rad"
         raise BadInput("run", recording.label(got), "closer rows, or the unit of the time in the header, such as time (ms)")
     if not has_closed_form(case.scene) and len(near := case.first(NUMERICAL, 2).t) < len(case.t):
         case = case.take(slice(0, len(near)))
@@ -275,11 +295,11 @@ def _stretches(case: Compared, from_row: bool) -> tuple[list[Compared], str, Arr
     whole = all(x is not None for x in case.data) or (case.data[1] is not None and case.scene.free)
     while True:
         end = len(rest.t)
-        if from_row and whole and end > 2:
+        if from_row and whole and end > 2 and not case.far:
             end, growth = _reach(rest)
             rest = replace(rest, growth=growth)
         part = rest.take(slice(0, end))
-        if part.free and not part.passes(part.error) and _near(part):
+        if part.free and not case.far and not part.passes(part.error) and _near(part):
             alone = np.maximum(alone, part.error.max(axis=1))
             initial, _, _ = part.fit(exact(part), np.zeros(0), np.zeros(0))
             fitted = part.at(initial)
@@ -297,7 +317,7 @@ def _stretches(case: Compared, from_row: bool) -> tuple[list[Compared], str, Arr
         changes = {name: x[0] for name, x in zip(("R_WB0", "w_WB_B0"), rest.data, strict=True) if x is not None}
         rest = replace(rest, scene=rest.scene.rename(rest.scene.name, **changes), start=float(rest.t[0]))
     part = parts[0]
-    if from_row and not whole and len(parts) == 1 and not part.passes(part.error) and len(part.t) > 3:
+    if from_row and not whole and not case.far and len(parts) == 1 and not part.passes(part.error) and len(part.t) > 3:
         guessed = replace(part, free=tuple(range(6)))
         initial, _, _ = guessed.fit(exact(guessed), np.zeros(0), np.zeros(0))
         guessed = replace(guessed.at(initial), free=part.free)

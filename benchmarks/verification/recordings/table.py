@@ -21,11 +21,12 @@ from ..solution import States
 from .also import Other, compare_others
 from .attitudes import convert, find_flips
 from .columns import choose
+from .describe import Description, Survey
 from .digits import find_digits
 from .formats import open_table
 from .formats.table import Table
 from .layout import Layout, Options
-from .rows import Cleaner
+from .rows import FEW, OTHER_CLOCK, Cleaner
 from .units import find_units, guess_time, open_readings
 
 SAMPLE = 400
@@ -43,8 +44,9 @@ class Recording:
     the motion of the scene decides. `digits` are the largest round-off of times, s, attitudes,
     rad, and rates, rad/s, that the digits in the file stand for. `path` is None for a motion that is not a file. `numbers` (n,)
     are rows in the file, from 1, `flipped` (n,) is True in rows in which the quaternion changes its sign, `left_out` has the
-    numbers of rows that were left out by reason, and `empty_at_end` is the number of rows without numbers at the end. `others`
-    are attitudes in other columns.
+    numbers of rows that were left out by reason, and `empty_at_end` is the number of rows without numbers at the end. `clock`
+    is the number of the clock, if it was set back. `others` are attitudes in other columns. `surveyed` describes the rows of a
+    file.
     """
 
     t: Array
@@ -61,7 +63,9 @@ class Recording:
     flipped: Any = None
     left_out: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
     empty_at_end: int = 0
+    clock: int = 0
     others: Sequence[Other] = ()
+    surveyed: Description | None = None
 
     def label(self, text: str) -> str:
         """Return a description of rows after the name of the file."""
@@ -71,14 +75,32 @@ class Recording:
         """Return the number in the file, from 1, of a row that is kept."""
         return int(row) + 1 if self.numbers is None else int(self.numbers[row])
 
+    def describe(self, noise: tuple[float, float]) -> Description:
+        """Return what the recording is; `noise` is the deviation of one axis of attitudes, rad, and of rates, rad/s."""
+        surveyed = self.surveyed
+        if surveyed is None:
+            (survey := Survey()).add(self.t, np.empty((len(self.t), 0)))
+            surveyed = survey.describe(1.0)
+        return replace(surveyed, digits=self.digits, noise=noise, left_out=self.left_out)
+
     def doubt(self, error: float | None) -> str:
         """Return the sentence on parts of the file that were not compared, or differ from the compared ones; "" without any."""
         if self.empty_at_end:
             return f"The last {self.empty_at_end} rows have no numbers, so the file does not show the end of its motion"
+        if (others := self.left_out.get(OTHER_CLOCK, 0)) > FEW * (self.rows + others):
+            return f"The clock was set back, and {others:,} rows are not compared. A file for each clock decides"
         for other in self.others:
             if not other.difference <= (other.allowed if error is None else error):
                 return f"{', '.join(other.names)} are {other.text}, and not the one that is compared. --columns decides"
         return self.layout.doubt
+
+    def between(self, first: int, last: int) -> Recording | None:
+        """Return the rows from one that is kept to another; None for a motion that is not in a file, or has chosen times."""
+        if self.path is None or self.options.start_time is not None or self.options.end_time is not None:
+            return None
+        digits = 1 - math.floor(math.log10(float(np.median(np.diff(self.t)))))  # a tenth of the time between two rows
+        start, end = (round(float(self.t[k]), digits) for k in (first, last))
+        return read(self.path, replace(self.options, start_time=start, end_time=end))
 
     def stream(self) -> Iterator[tuple[Array, States, Array | None, Any]]:
         """Yield times, motion, `unit_errors` and numbers of all rows, in chunks."""
@@ -86,7 +108,7 @@ class Recording:
             numbers = 1 + np.arange(len(self.t)) if self.numbers is None else self.numbers
             yield self.t, self.data, self.unit_errors, numbers
             return
-        cleaner = Cleaner(self.path, self.layout, self.options)
+        cleaner = Cleaner(self.path, self.layout, self.options, keep=self.clock)
         for values in open_table(self.path).rows(self.layout.columns):
             chosen, numbers = cleaner.choose(*cleaner.continue_times(values))
             if len(chosen):
@@ -110,8 +132,11 @@ def read_all(paths: Sequence[Path], options: Options) -> list[Recording]:
     return [recording for recording, _ in made]
 
 
-def _read(path: Path, options: Options) -> tuple[Recording, dict[str, BadInput]]:
-    """Return the motion in a file, and the errors of options that it does not use."""
+def _read(path: Path, options: Options, clock: int = 0) -> tuple[Recording, dict[str, BadInput]]:
+    """Return the motion in a file, and the errors of options that it does not use.
+
+    If the clock was set back, rows of one `clock` are compared: those of the clock with the most rows.
+    """
     if options.euler is not None and not re.fullmatch("(?!.*(.)\\1)[xyz]{3}", options.euler):
         raise BadInput("euler", repr(options.euler), "three of the letters x, y, z without equal neighbours, such as zyx")
     start, end = options.start_time, options.end_time
@@ -123,14 +148,13 @@ def _read(path: Path, options: Options) -> tuple[Recording, dict[str, BadInput]]
         raise BadInput(
             "rates", f"'world', for {path.name} without attitudes", "body, or a file with attitudes to convert the rates"
         )
-    unused = _unused(layout, options)
+    original, unused = options, _unused(layout, options)
     if "quaternion" in unused:  # named columns have their order
         options = replace(options, quaternion=None)
-    cleaner, kept, numbers = Cleaner(path, layout, options), list[Array](), list[Array]()
+    cleaner, survey, kept, numbers = Cleaner(path, layout, options, keep=clock), Survey(), list[Array](), list[Array]()
     every, rows, first, last = 1, 0, True, math.nan
     extra = [name for _, part in layout.also for name in part]
-    # The time, then the columns of rates and attitudes; `extra` follows.
-    width = 1 + sum(map(len, [*layout.used.values()][1:]))
+    width = cleaner.width  # `extra` follows
     for chunk in table.rows([*layout.columns, *extra]):
         if first and len(chunk):
             guess_time(chunk, layout)
@@ -140,6 +164,7 @@ def _read(path: Path, options: Options) -> tuple[Recording, dict[str, BadInput]]
             find_units(values[usable, :width], layout, options)
             first = False
         values, at = cleaner.choose(values, at)
+        survey.add(values[:, 0], values[:, width - 4 : width] if layout.attitude == "quaternion" else values[:, :0])
         # Every `every`-th row of the file, counted over all chunks.
         kept.append(values[-rows % every :: every])
         numbers.append(at[-rows % every :: every])
@@ -147,6 +172,9 @@ def _read(path: Path, options: Options) -> tuple[Recording, dict[str, BadInput]]
         while sum(map(len, kept)) > 2 * ROWS:
             kept, numbers, every = [np.concatenate(kept)[::2]], [np.concatenate(numbers)[::2]], 2 * every
         last = values[-1, 0] if len(values) else last
+    cleaner.finish()
+    if cleaner.pieces and (longest := max(cleaner.pieces, key=lambda piece: (cleaner.pieces[piece], -piece))) != clock:
+        return _read(path, original, longest)
     if rows < 2:
         left = "".join(f", and {count} {reason}" for reason, count in cleaner.left_out.items() if count)
         raise BadInput("run", f"{path} with {rows} rows{left}", "a header and two rows or more")
@@ -172,7 +200,9 @@ def _read(path: Path, options: Options) -> tuple[Recording, dict[str, BadInput]]
             flipped=find_flips(raw[:, :width], layout),
             left_out={reason: count for reason, count in cleaner.left_out.items() if count},
             empty_at_end=cleaner.empty_at_end,
+            clock=clock,
             others=compare_others(data, digits, raw[:, width:], layout, options),
+            surveyed=survey.describe(float(layout.sizes[0])),
         )
 
     recordings = [make(*reading) for reading in open_readings(layout, options)]

@@ -17,13 +17,16 @@ from conservative.number_text import number
 from conservative.scene import Scene
 from conservative.trajectory import Trajectory
 
-from ..compare import FEWEST_FOR_NOISE, SIGMAS, UNITS_OF_DIGITS, Compared
+from ..compare import FEWEST_FOR_NOISE, MOST_NOISE, SIGMAS, UNITS_OF_DIGITS, Compared
 from ..explain import Diagnosis, diagnose, fit_moments
 from ..explanation import Explanation
 from ..finding import Cause, Finding, Verdict, Verification, uncapitalised
 from ..mistakes import BY_KEY
-from .comparison import MOST_NOISE, Comparison, compare, prepare
+from .comparison import Comparison, compare, prepare
+from .describe import Description, at_rest, only_noise, unseen
+from .rows import OUTSIDE, REPEATED
 from .table import Recording
+from .windows import find_stretch
 
 ACCURATE, ACCURATE_SINGLE = 1e-6, 1e-4
 """Errors that a good solver may leave, in double and in single precision."""
@@ -32,9 +35,24 @@ SHAPE = 1e-6
 UNITS = "rad", "of the largest rate"
 FAR = 0.05
 """Error, rad or relative to the largest rate, above which a motion is a different one."""
+NOT_FREE = "that are not free motion"
+"""Reason to leave a row of a throw out."""
 HIDDEN = (
     "The motion multiplies the digits or the noise of the first row to the size of the error. More digits, a shorter file "
     "(--until), or --start scene decide"
+)
+
+RESTING = (
+    "The body is at rest in all rows, and the scene starts with {rate:.3g} rad/s, so that the file does not show its motion. "
+    "--start scene decides"
+)
+FAR_APART = (
+    "The body turns by {angle:.2g} rad from row to row, so that the digits of the first row decide where it is in all others. "
+    "Closer rows decide, or the unit of the time in the header, such as time (ms)"
+)
+NOISE_ONLY = (
+    "The rows are noise as large as their motion, as of a body at rest, and show no motion. Rows of a motion, or --error, "
+    "decide"
 )
 
 
@@ -67,14 +85,16 @@ class Details:
 
     Attributes
     ----------
+    description
+        What the recording is: its rows, times, digits and noise.
     error, allowed, by, noise
         Largest errors, the allowed ones, what allows them, and the noise of one axis.
     digits
         Largest rounding of times, s, attitudes, rad, and rates, rad/s, by the digits of the file.
     first_row
         Errors of the motion that starts exactly in the first row, if a fitted start has smaller ones; else 0.
-    units
-        Units in which attitudes and rates are shown.
+    units, scale
+        Units in which attitudes and rates are shown, and the largest rate, rad/s.
     compared, in_file
         Numbers of rows.
     used
@@ -91,10 +111,13 @@ class Details:
         All mistakes that were tried, best first.
     quantities
         Errors and drifts.
+    stretch
+        First and last row of the free motion in a recording of a throw; None if all rows are compared.
     times, series
         Times (n,), s, and values (n,) of each quantity at them.
     """
 
+    description: Description
     error: tuple[float, float]
     allowed: tuple[float, float]
     by: tuple[str, str]
@@ -102,6 +125,7 @@ class Details:
     digits: tuple[float, float, float]
     first_row: tuple[float, float]
     units: tuple[Unit, Unit]
+    scale: float
     compared: int
     in_file: int
     used: Mapping[str, Sequence[str]]
@@ -111,12 +135,19 @@ class Details:
     candidates: Sequence[Explanation]
     tried: Sequence[Explanation]
     quantities: Sequence[Quantity]
+    stretch: tuple[int, int] | None
     times: Array = field(repr=False)
     series: Mapping[str, Array] = field(repr=False)
 
     def show(self, errors: Sequence[float]) -> str:
         """Return errors of attitudes and rates, as far as the recording has them, in their units."""
         return " and ".join(unit.show(error) for error, unit in zip(errors, self.units, strict=True) if unit.size)
+
+    @property
+    def lines(self) -> tuple[str, str]:
+        """Two sentences on what the recording is: on rows and times, and on digits and noise."""
+        attitudes, rates = self.units
+        return self.description.lines(bool(attitudes.size), bool(rates.size), self.scale, rates.name == "deg/s")
 
     @property
     def worse(self) -> int:
@@ -173,26 +204,39 @@ def verify_recording(
     shaped, explained = comparison.shape[0] <= shape_allowed, Diagnosis()
     if comparison.outliers and not comparison.passed:
         explained = Diagnosis([_single_rows(comparison)])
-    elif not comparison.passed:
+    elif not comparison.passed and not (error is None and only_noise(comparison.case)):
         tell("explain")
         whole = replace(comparison.case, growth=comparison.parts[0].growth)
         explained = diagnose(whole, recording.layout.attitude in (None, "quaternion"), tell)
     # Numbers that are fitted to rows that a start can explain as well prove nothing.
-    hidden = not (comparison.passed or comparison.outliers) and error is None and comparison.case.hidden()
+    decided = comparison.passed or comparison.outliers or comparison.case.far
+    hidden = not decided and error is None and comparison.case.hidden()
     proven = [explanation for explanation in explained.named if explanation.explains and not (hidden and explanation.numbers)]
     verdict, doubt = Verdict.WRONG, ""
     if comparison.passed and shaped:
         verdict, doubt = Verdict.RIGHT, comparison.undecided or recording.doubt(error)
+        if from_row and at_rest(comparison.case) and scene.w_WB_B0.any():
+            doubt = doubt or RESTING.format(rate=float(np.linalg.norm(scene.w_WB_B0)))
     elif error is None and shaped and not proven:
         doubt = HIDDEN if hidden else _doubt(comparison.case, comparison.errors, rows.resolved, recording)
     verdict = Verdict.UNDECIDED if doubt else verdict
     case = comparison.case
+    if verdict is Verdict.WRONG and not proven and from_row and shaped and not comparison.outliers:
+        tell("free motion")
+        if (made := _thrown(scene, recording, case, error, name)) is not None:
+            return made
     # With noise, the fit shows how well the recording determines the moments.
-    if verdict is Verdict.RIGHT and case.noise.max() > 1e-6 and case.scene.free and case.scene.body.rotor_momentum is None:
+    if (
+        verdict is Verdict.RIGHT
+        and not case.far
+        and case.noise.max() > 1e-6
+        and case.scene.free
+        and case.scene.body.rotor_momentum is None
+    ):
         tell("moments")
         fit = fit_moments(case)
         notes += [f"{fit.sentence}."] * bool((np.array(fit.left) <= case.allowed).all())
-    notes += explained.notes
+    notes += [*explained.notes, *(unseen(case) if verdict is Verdict.RIGHT else [])]
     if len(comparison.parts) > 1:
         notes.append(
             f"The exact motion starts again in {len(comparison.parts) - 1} rows: it multiplies the rounding of a row too much."
@@ -203,6 +247,7 @@ def verify_recording(
     limits = [size * x for (_, size), x in zip(units, case.allowed.tolist(), strict=True) if size]
     largest = comparison.worst.max(axis=1)
     details = Details(
+        description=recording.describe((float(rows.noise[0]), float(rows.noise[1]) * case.scale)),
         error=_pair(largest),
         allowed=_pair(case.allowed),
         by=rows.allowed.by,
@@ -210,6 +255,7 @@ def verify_recording(
         digits=recording.digits,
         first_row=_pair(comparison.alone),
         units=units,
+        scale=case.scale,
         compared=comparison.compared,
         in_file=recording.rows + sum(recording.left_out.values()),
         used={kind: tuple(part) for kind, part in recording.layout.used.items() if part},
@@ -222,6 +268,7 @@ def verify_recording(
             Quantity(quantity, float(x.max()), float(x[-1]), limits[i] if i < len(limits) else math.nan)
             for i, (quantity, x) in enumerate(series.items())
         ],
+        stretch=None,
         times=comparison.case.t[: len(comparison.errors[0])] + comparison.shift,
         series=series,
     )
@@ -243,6 +290,29 @@ def verify_recording(
     return Verification(name, "recording", [finding], _reason(finding, details, proven), notes, details)
 
 
+def _thrown(scene: Scene, recording: Recording, case: Compared, error: float | None, name: str) -> Verification | None:
+    """Return the verification of the rows of free motion in a recording of a throw; None if it is none, or these are wrong."""
+    stretch = find_stretch(case)
+    part = None if stretch is None else recording.between(stretch.first, stretch.last)
+    if stretch is None or part is None:
+        return None
+    made = verify_recording(scene, part, error=error, name=name)
+    if made.verdict is not Verdict.RIGHT:
+        return None
+    first, last = part.number(0), part.number(len(part.t) - 1)
+    assert isinstance(made.details, Details)
+    left_out = {NOT_FREE if reason == OUTSIDE else reason: count for reason, count in part.left_out.items()}
+    details = replace(made.details, stretch=(first, last), description=replace(made.details.description, left_out=left_out))
+    made = replace(made, details=details)
+    rows = f"rows {first:,} to {last:,} ({part.t[0]:.6g} to {part.t[-1]:.6g} s) are free motion"
+    if not stretch.open:
+        return replace(made, reason=f"{rows}; the other rows are not, and are not compared; {made.reason}")
+    start, end = part.options.start_time, part.options.end_time
+    doubt = f"{rows[:1].upper()}{rows[1:]}, and {stretch.open}. --from {start!r} --until {end!r} compares these rows alone"
+    findings = [replace(finding, verdict=Verdict.UNDECIDED, detail=doubt) for finding in made.findings]
+    return replace(made, findings=findings, reason=f"{doubt}; {made.reason}")
+
+
 def _pair(values: Array) -> tuple[float, float]:
     return float(values[0]), float(values[1])
 
@@ -255,10 +325,13 @@ def _reason(finding: Finding, details: Details, proven: Sequence[Explanation]) -
     """Return the reason of the verdict: the errors, the allowed errors, and the mistakes with the errors that they leave."""
     allowed = details.show(details.allowed)
     verb = "are" if all(unit.size for unit in details.units) else "is"
+    no_gap = OUTSIDE, REPEATED, NOT_FREE
+    left = sum(count for reason, count in details.description.left_out.items() if reason not in no_gap)
     decided = [
         f"its largest error is {details.show(details.error)}",
         f"{allowed} {verb} allowed by {'--error' if finding.by == 'error' else f'its {finding.by}'}",
         *([details.shape] if details.shape else []),
+        *([f"{left:,} of {details.in_file:,} rows are left out"] if 2 * left > details.in_file else []),
     ]
     causes = [
         uncapitalised(explanation.sentence) + (f" (leaves {details.show(explanation.left)})" if max(explanation.plain) else "")
@@ -273,14 +346,24 @@ def _reason(finding: Finding, details: Details, proven: Sequence[Explanation]) -
 
 
 def _single_rows(comparison: Comparison) -> Explanation:
-    row, at, size = comparison.outliers[0]
-    values = {"row": float(row), "time": at, "error": size}
-    mistake, before = BY_KEY["single rows"], comparison.worst.max(axis=1).tolist()
-    return Explanation((mistake.key,), mistake.sentence.format(**values), values, [0.0, 0.0], before, 0.0, 0.0, True)
+    """Return the explanation by single rows that are off, or by spoiled rates where quaternions change their sign."""
+    (row, at, size), case = comparison.outliers[0], comparison.case
+    key, values = "single rows", {"row": float(row), "time": at, "error": size}
+    flips = case.t[case.flipped] if case.flipped is not None else np.zeros(0)
+    near = 1.5 * float(np.median(np.diff(case.t)))  # the row of the change, or a neighbour
+    times = [time for _, time, _ in comparison.outliers]
+    if len(times) > 1 and len(flips) and all(np.abs(flips - time).min() < near for time in times):
+        key, values = "rates at sign changes", {"rows": float(len(times)), "first": float(row)}
+    mistake, before = BY_KEY[key], comparison.worst.max(axis=1).tolist()
+    return Explanation((key,), mistake.sentence.format(**values), values, [0.0, 0.0], before, 0.0, 0.0, True)
 
 
 def _doubt(case: Compared, errors: Array, resolved: Array, recording: Recording) -> str:
     """Return the sentence on the data that would decide, if errors may be harmless; "" if they are wrong."""
+    if case.far:
+        return FAR_APART.format(angle=case.gap)
+    if only_noise(case):
+        return NOISE_ONLY
     single = max(recording.digits[1:]) > 1e-9  # fewer than nine digits
     if errors.max() <= (ACCURATE_SINGLE if single else ACCURATE) and errors.max() > case.allowed.min():
         return (
