@@ -16,7 +16,23 @@ from conservative.attitude import Array, angle_between, to_quaternion
 from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 
-from .compare import FLOOR, LINEAR, LONGEST, NUMERICAL, SIGMAS, Compared, Effort, Solution, differ, exact, linearise
+from .compare import (
+    FLOOR,
+    HOPELESS,
+    LINEAR,
+    LONGEST,
+    MOST_NOISE,
+    NUMERICAL,
+    SIGMAS,
+    Compared,
+    Effort,
+    Solution,
+    allow,
+    differ,
+    estimate_noise,
+    exact,
+    linearise,
+)
 from .explanation import HALF, PROVEN, Explanation, Trial, attempt, explain
 from .find_steps import PARTS, STEPS_AT_MOST, Linearised, by_step, find_steps
 from .mistakes import BY_KEY
@@ -202,8 +218,36 @@ def _readings(case: Compared, asked: _Asked) -> Explanations:
         R, w = motion(near.scene.R_WB0[None], near.scene.w_WB_B0[None], np.zeros((1, 0)), len(near.t))
         # A reading that makes the first rows much worse than they are is not tried on all rows.
         if (near.errors(R[0], w[0]) <= 2 * case.error[:, :10].max() + 10 * case.allowed.max()).all():
-            explanation = attempt(case, trial)
+            explanation = _read_again(case, trial) if any(case.open) else attempt(case, trial)
             yield explanation if _moves(case, explanation) else None
+
+
+def _read_again(case: Compared, trial: Trial) -> Explanation | None:
+    """Return the explanation by other readings, of rows whose noise they show only if they are read so; None if they do not.
+
+    Rates in degrees that are read as rad/s turn the body so far between two rows that noise is hidden.
+    """
+    R, w = case.data
+    for reading in trial.mistakes:
+        assert isinstance(reading, Reading)
+        R, w = reading.read(R, w)
+    again, motion = case.read(R, w), trial.build(case)
+    scale = case.scale if w is None else float(np.linalg.norm(w, axis=1).max()) or 1.0
+    noise, resolved = estimate_noise(case.t, again.data)
+    have = np.array([x is not None for x in again.data])
+    if not resolved[have].all() or (noise / [1.0, scale] > MOST_NOISE).any():
+        return None
+    allowed = allow(case.rounded, noise / [1.0, scale])
+    again = replace(again, scale=scale, allowed=allowed.errors, noise=allowed.noise, open=(False, False))
+    if not again.passes(again.error) and (again.error.max(axis=1) < HOPELESS * again.allowed).all():
+        again = again.at(again.fit(exact(again), np.zeros(0), np.zeros(0))[0])
+    if not again.passes(again.error) or motion is None:
+        return None
+    made = motion(case.scene.R_WB0[None], case.scene.w_WB_B0[None], np.zeros((1, 0)), len(case.t))
+    explanation = explain(case, trial, (made[0][0], made[1][0]))
+    left = (again.error.max(axis=1) * [1.0, scale / case.scale]).tolist()
+    share = float(max(left) / max(*explanation.plain, 1e-15))
+    return replace(explanation, left=left, share=share, rest=share, size=again.size(again.error), explains=share < HALF)
 
 
 def _changes(case: Compared, asked: _Asked) -> Explanations:
@@ -560,6 +604,7 @@ def _part_standstill(case: Compared, mistake: Standstill) -> Explanation | None:
     if case.data[0] is None or case.data[1] is None or case.step is not None:
         return None
     k, x = _first_still(case, i), case.data[i]
+    assert x is not None
     rest = i == 1 and bool(np.abs(x[k:]).max() <= _still_within(case)[1] * case.scale)
     if len(case.t) - k < 3 or mistake.rest != (0.0 if rest else 1.0) or (case.error[i, k:] <= case.allowed[i]).all():
         return None
@@ -1010,7 +1055,7 @@ class Search:
 SEARCHES = {
     "units of time": Search(_units, frozenset({"times"}), 0.05, ends=True, whole=True, least=1),
     "other equations": Search(_changes, frozenset({"scenes", "equations"}), 0.3),
-    "other readings": Search(_readings, frozenset({"readings"}), 0.1, ends=True),
+    "other readings": Search(_readings, frozenset({"readings"}), 0.2, ends=True),
     "habits": Search(_habits, frozenset({"habits"}), 0.1, least=1),
     "resampled rows": Search(lambda case, asked: find_resampled(case), frozenset({"rows"}), 0.05, ends=True, whole=True),
     "wrong rows": Search(_rows, frozenset({"rows"}), 0.01, ends=True),
