@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from conservative.attitude import Array
+from conservative.check import LARGEST, SMALLEST
 from conservative.errors import BadInput
 
 from .digits import find_quantum
@@ -69,7 +70,8 @@ def _parts(time: list[str], sample: Sample) -> list[list[str]]:
             whole, fraction = (sample([name])[:, 0] for name in time)
         except BadInput:
             return [time]
-        if np.nanmax(np.abs(fraction)) * FRACTIONS[parse(time[1]).all[-1]] > 1 or (np.fmod(whole, 1) != 0).any():
+        whole, fraction = whole[np.isfinite(whole)], fraction[np.isfinite(fraction)]
+        if np.abs(fraction).max(initial=0.0) * FRACTIONS[parse(time[1]).all[-1]] > 1 or (whole != np.rint(whole)).any():
             return [[name] for name in time]
     return [time]
 
@@ -80,7 +82,7 @@ def _seconds(time: Sequence[str], sample: Sample) -> Array:
         x = np.column_stack([sample([name])[:, 0] for name in time])
     except BadInput:
         return np.empty(0)
-    x = x[np.isfinite(x).all(axis=1)]
+    x = x[(np.abs(x) <= LARGEST).all(axis=1)]
     return x[:, 0] if len(time) == 1 else x[:, 0] - x[:1, 0] + x[:, 1] * FRACTIONS[parse(time[1]).all[-1]]
 
 
@@ -92,6 +94,8 @@ def _increases(t: Array) -> bool:
 
 def _grain(t: Array) -> float:
     """Return the last bit of times relative to their gap, in powers of ten, and 1e-9 for smaller ones."""
+    if not _increases(t):
+        return 0.0
     gaps = np.diff(t)
     bit = float(np.spacing(np.abs(t).max()) / np.median(gaps[gaps > 0]))
     return float(np.ceil(np.log10(max(bit, 1e-9))))
@@ -102,10 +106,11 @@ def _same_steps(t: Array, other: Array) -> bool:
     n = min(len(t), len(other))
     bits = 4 * np.spacing(np.abs(t).max(initial=0.0)), 4 * np.spacing(np.abs(other).max(initial=0.0))
     t, other = t[:n] - t[:1], other[:n] - other[:1]
-    if n < 2 or t[-1] <= 0 or other[-1] <= 0:
+    if n < 2 or not SMALLEST < t[-1] < LARGEST or not SMALLEST < other[-1] < LARGEST:
         return False
-    ratios = [10.0 ** round(math.log10(other[-1] / t[-1] * days)) / days for days in (1.0, 86_400.0, 1 / 86_400)]
-    ratio = min(ratios, key=lambda size: abs(size / (other[-1] / t[-1]) - 1))
+    size = math.log10(other[-1]) - math.log10(t[-1])
+    ratios = [10.0 ** round(size + math.log10(days)) / days for days in (1.0, 86_400.0, 1 / 86_400)]
+    ratio = min(ratios, key=lambda ratio: abs(math.log10(ratio) - size))
     gap = float(np.median(np.diff(t)))
     allowed = SAME * gap + bits[0] + bits[1] / ratio
     return bool(np.abs(other / ratio - t).max() <= allowed)
@@ -136,7 +141,8 @@ def decide_sets(
         key=lambda pair: pair[0],
     )
     if ranked[0][0] > AGREES or ranked[1][0] * BETTER < ranked[0][0]:
-        return [readings[i] for off, i in ranked if off <= AGREES or ranked[0][0] > AGREES]
+        agreeing = [readings[i] for off, i in ranked if off <= AGREES]
+        return agreeing if len(agreeing) > 1 else readings
     best = readings[ranked[0][1]]
     open_ = [kind for kind in best if any(reading[kind] != best[kind] for reading in readings)]
     for kind in open_:
@@ -180,7 +186,7 @@ def _equal(kind: str, names: Sequence[str], others: Sequence[str], sample: Sampl
         return False
     n = min(len(a), len(b))
     a, b = a[:n], b[:n]
-    rows = np.isfinite(a).all(axis=1) & np.isfinite(b).all(axis=1)
+    rows = (np.abs(a) <= LARGEST).all(axis=1) & (np.abs(b) <= LARGEST).all(axis=1)
     a, b = a[rows], b[rows]
     if not len(a):
         return False
@@ -203,7 +209,7 @@ def _disagreement(reading: Mapping[str, list[str]], attitude: str, layout: Layou
         values = trial.join_time(values)
     except BadInput:
         return math.inf
-    values = values[np.isfinite(values).all(axis=1)]
+    values = values[(np.abs(values) <= LARGEST).all(axis=1)]
     if len(values) < 3 or (np.diff(values[:, 0]) <= 0).any():
         return math.inf
     with np.errstate(all="ignore"):

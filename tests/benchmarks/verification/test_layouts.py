@@ -66,6 +66,7 @@ READ = {
     "elapsed seconds": {"time": np.round(1e9 * EPOCH), "seconds_elapsed": T} | block("rotationRate*", "XYZ", W) | QUAT,
     "time in other words": {"Elapsed Time (ms)": 1e3 * T} | RATE,
     "simulation time": {"sim_time": T, "dt": ZERO + 0.005, "wall_time": LATE} | RATE,
+    "times of two sensors": {"baro_time": LATE, "imu_time": T} | block("imu_gyro_* (rad/s)", "xyz", W),
     "equal times": {"time_s": T, "time_ms": 1e3 * T, "frame": np.arange(len(T))} | RATE,
     # quaternions
     "scalar last by name": TIME | block("quat_*", "xyzw", XYZW) | RATE,
@@ -476,6 +477,15 @@ def test_a_layout_that_is_not_clear_is_a_question_whose_answer_works(name, tmp_p
     attitudes, rates = has(ASKED[name])
     options |= {"world": True} if name == "only world rates" else {}
     compare(settled(path, **options), attitudes, rates or "world" in options)
+
+
+def test_sets_of_which_one_is_a_little_better_are_a_question(tmp_path):
+    sets = block("gyro_1_* (rad/s)", "xyz", W + 0.1 * NOISE) | block("gyro_2_* (rad/s)", "xyz", W + 0.3 * NOISE)
+    path = write(tmp_path, TIME | QUAT | sets)
+    with pytest.raises(BadInput) as error:
+        read(path, Options())
+    assert all(column in str(error.value) for column in sets)
+    assert read(path, Options(**answer(error.value))).data[1] is not None
 
 
 BESIDE = {
