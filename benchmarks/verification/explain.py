@@ -85,7 +85,8 @@ def diagnose(
     same on a busy machine.
     """
     whole = _before_divergence(whole)
-    case = whole.first(LONGEST, FEWEST).first(NUMERICAL, 2)  # 100 rad, or 100 rows if they take longer; at most 5000 rad
+    case = whole.first(LONGEST, FEWEST)  # 100 rad, or 100 rows if they take longer
+    case = case.first(NUMERICAL, 2) if has_closed_form(case.scene) else case.first(NUMERICAL / 10, 4)
     if case.error.max() <= case.allowed.max() and len(case.t) < len(whole.t):
         case = whole  # the error is later
     stride = -(-len(case.t) // MOST)

@@ -94,6 +94,14 @@ class Recording:
                 return f"{', '.join(other.names)} are {other.text}, and not the one that is compared. --columns decides"
         return self.layout.doubt
 
+    def between(self, first: int, last: int) -> Recording | None:
+        """Return the rows from one that is kept to another; None for a motion that is not in a file, or has chosen times."""
+        if self.path is None or self.options.start_time is not None or self.options.end_time is not None:
+            return None
+        digits = 1 - math.floor(math.log10(float(np.median(np.diff(self.t)))))  # a tenth of the time between two rows
+        start, end = (round(float(self.t[k]), digits) for k in (first, last))
+        return read(self.path, replace(self.options, start_time=start, end_time=end))
+
     def stream(self) -> Iterator[tuple[Array, States, Array | None, Any]]:
         """Yield times, motion, `unit_errors` and numbers of all rows, in chunks."""
         if self.path is None or self.rows == len(self.t):

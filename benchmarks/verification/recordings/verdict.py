@@ -26,6 +26,7 @@ from .comparison import Comparison, compare, prepare
 from .describe import Description, at_rest, only_noise, unseen
 from .rows import OUTSIDE, REPEATED
 from .table import Recording
+from .windows import find_stretch
 
 ACCURATE, ACCURATE_SINGLE = 1e-6, 1e-4
 """Errors that a good solver may leave, in double and in single precision."""
@@ -34,6 +35,8 @@ SHAPE = 1e-6
 UNITS = "rad", "of the largest rate"
 FAR = 0.05
 """Error, rad or relative to the largest rate, above which a motion is a different one."""
+NOT_FREE = "that are not free motion"
+"""Reason to leave a row of a throw out."""
 HIDDEN = (
     "The motion multiplies the digits or the noise of the first row to the size of the error. More digits, a shorter file "
     "(--until), or --start scene decide"
@@ -108,6 +111,8 @@ class Details:
         All mistakes that were tried, best first.
     quantities
         Errors and drifts.
+    stretch
+        First and last row of the free motion in a recording of a throw; None if all rows are compared.
     times, series
         Times (n,), s, and values (n,) of each quantity at them.
     """
@@ -130,6 +135,7 @@ class Details:
     candidates: Sequence[Explanation]
     tried: Sequence[Explanation]
     quantities: Sequence[Quantity]
+    stretch: tuple[int, int] | None
     times: Array = field(repr=False)
     series: Mapping[str, Array] = field(repr=False)
 
@@ -215,6 +221,10 @@ def verify_recording(
         doubt = HIDDEN if hidden else _doubt(comparison.case, comparison.errors, rows.resolved, recording)
     verdict = Verdict.UNDECIDED if doubt else verdict
     case = comparison.case
+    if verdict is Verdict.WRONG and not proven and from_row and shaped and not comparison.outliers:
+        tell("free motion")
+        if (made := _thrown(scene, recording, case, error, name)) is not None:
+            return made
     # With noise, the fit shows how well the recording determines the moments.
     if (
         verdict is Verdict.RIGHT
@@ -258,6 +268,7 @@ def verify_recording(
             Quantity(quantity, float(x.max()), float(x[-1]), limits[i] if i < len(limits) else math.nan)
             for i, (quantity, x) in enumerate(series.items())
         ],
+        stretch=None,
         times=comparison.case.t[: len(comparison.errors[0])] + comparison.shift,
         series=series,
     )
@@ -279,6 +290,29 @@ def verify_recording(
     return Verification(name, "recording", [finding], _reason(finding, details, proven), notes, details)
 
 
+def _thrown(scene: Scene, recording: Recording, case: Compared, error: float | None, name: str) -> Verification | None:
+    """Return the verification of the rows of free motion in a recording of a throw; None if it is none, or these are wrong."""
+    stretch = find_stretch(case)
+    part = None if stretch is None else recording.between(stretch.first, stretch.last)
+    if stretch is None or part is None:
+        return None
+    made = verify_recording(scene, part, error=error, name=name)
+    if made.verdict is not Verdict.RIGHT:
+        return None
+    first, last = part.number(0), part.number(len(part.t) - 1)
+    assert isinstance(made.details, Details)
+    left_out = {NOT_FREE if reason == OUTSIDE else reason: count for reason, count in part.left_out.items()}
+    details = replace(made.details, stretch=(first, last), description=replace(made.details.description, left_out=left_out))
+    made = replace(made, details=details)
+    rows = f"rows {first:,} to {last:,} ({part.t[0]:.6g} to {part.t[-1]:.6g} s) are free motion"
+    if not stretch.open:
+        return replace(made, reason=f"{rows}; the other rows are not, and are not compared; {made.reason}")
+    start, end = part.options.start_time, part.options.end_time
+    doubt = f"{rows[:1].upper()}{rows[1:]}, and {stretch.open}. --from {start!r} --until {end!r} compares these rows alone"
+    findings = [replace(finding, verdict=Verdict.UNDECIDED, detail=doubt) for finding in made.findings]
+    return replace(made, findings=findings, reason=f"{doubt}; {made.reason}")
+
+
 def _pair(values: Array) -> tuple[float, float]:
     return float(values[0]), float(values[1])
 
@@ -291,7 +325,8 @@ def _reason(finding: Finding, details: Details, proven: Sequence[Explanation]) -
     """Return the reason of the verdict: the errors, the allowed errors, and the mistakes with the errors that they leave."""
     allowed = details.show(details.allowed)
     verb = "are" if all(unit.size for unit in details.units) else "is"
-    left = sum(count for reason, count in details.description.left_out.items() if reason not in (OUTSIDE, REPEATED))
+    no_gap = OUTSIDE, REPEATED, NOT_FREE
+    left = sum(count for reason, count in details.description.left_out.items() if reason not in no_gap)
     decided = [
         f"its largest error is {details.show(details.error)}",
         f"{allowed} {verb} allowed by {'--error' if finding.by == 'error' else f'its {finding.by}'}",

@@ -1,12 +1,16 @@
 """Rows that are left out, times that go on, and columns that forbid the verdict "right"."""
 
+import re
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import conservative as cv
 from conservative.benchmarks.verification.recordings.table import Options, read
 from conservative.benchmarks.verification.recordings.verdict import verify_recording
 from conservative.errors import BadInput
+from conservative.references.exact.method import free_body
 
 from .made import FREE, T, exact
 
@@ -17,13 +21,13 @@ QUATERNION = {f"q_{part}": Q[:, i] for i, part in enumerate("wxyz")}
 MOTION = {**QUATERNION, **RATES}
 
 
-def verify(folder, table, **options):
+def verify(folder, table, scene=FREE, **options):
     """The verification of a table, whose numbers are written with 17 digits, nan as an empty field."""
     values = [np.asarray(column) for column in table.values()]
     rows = ["" if x != x else f"{x:.17g}" for row in zip(*values, strict=True) for x in row]
     lines = [",".join(rows[i : i + len(values)]) for i in range(0, len(rows), len(values))]
     (folder / "run.csv").write_text("\n".join([",".join(table), *lines]) + "\n")
-    return verify_recording(FREE, read(folder / "run.csv", Options(**options)))
+    return verify_recording(scene, read(folder / "run.csv", Options(**options)))
 
 
 def with_nan(rows):
@@ -167,31 +171,6 @@ def test_a_window_leaves_out_what_is_not_the_motion(tmp_path):
         verify(tmp_path, {"t": T} | MOTION, start_time=7.0)
 
 
-NANO = 1.7e9 + np.floor(T), np.round(1e9 * (T - np.floor(T)))
-TIMES = {
-    "a temperature": {"timestamp": T, "T": 20 + T},
-    "the arrival": {"%time": 1.7e18 + 1e9 * (T + 0.003 * np.sin(40 * T)), "header.stamp": 1.7e18 + np.round(1e9 * T)},
-    "ROS 2": {"header.stamp.sec": NANO[0], "header.stamp.nanosec": NANO[1]},
-    "ROS 1": {"field.header.stamp.secs": NANO[0], "field.header.stamp.nsecs": NANO[1]},
-    "struct timeval": {"tv_sec": NANO[0], "tv_usec": np.round(NANO[1] / 1e3)},
-}
-
-
-@pytest.mark.parametrize("name", TIMES)
-def test_the_time_is_the_column_of_the_measurement(name, tmp_path):
-    found = verify(tmp_path, TIMES[name] | MOTION)
-    assert found.verdict == "right"
-    exact_times = name not in ("the arrival",)  # 256 ns are the last bit of 1.7e18
-    assert max(found.details.error) < (1e-9 if exact_times else 1e-5)  # measured: 2e-13; 6e-7
-
-
-def test_deviations_and_biases_are_no_second_set_of_rates(tmp_path):
-    more = {f"angular_velocity_covariance{i}": 0 * T for i in range(9)} | {f"gyro_bias_{i}": 0 * T + 1 for i in "xyz"}
-    rates = {f"angular_velocity.{axis}": W[:, i] for i, axis in enumerate("xyz")}
-    found = verify(tmp_path, {"t": T} | rates | more)
-    assert (found.verdict, set(found.details.unused)) == ("right", set(more))
-
-
 YAW, PITCH, ROLL = Rotation.from_matrix(R).as_euler("ZYX", degrees=True).T
 AWAY = Rotation.from_matrix(R) * Rotation.from_rotvec(0.1 * T[:, None] * [0, 1, 0])
 SEEN = {
@@ -207,6 +186,7 @@ SEEN = {
     "an unknown sequence": ({f"euler_{axis}": T for axis in "xyz"}, "undecided"),
     "a frame that moves": ({f"q_lvlh_{part}": Q[:, i] for i, part in enumerate("wxyz")}, "undecided"),
     "a part of a quaternion": ({"q_x": Q[:, 1], "q_y": Q[:, 2], "q_z": Q[:, 3]}, "undecided"),
+    "a quaternion of any name": ({f"b{i}": Q[:, i] for i in range(4)}, "undecided"),
     "no attitude": ({"altitude": T, "quality": T, "gyro_temperature": T, "roll_command": T, "torque_x": T}, "right"),
 }
 
@@ -257,3 +237,76 @@ def test_angles_of_a_top(tmp_path):
     assert verify(tmp_path, {"t": T} | angles | RATES, euler="zxz", units="rad").verdict == "right"
     turned = {name: angles[name] for name in ("psi", "theta", "phi")}
     assert verify(tmp_path, {"t": T} | turned | RATES, euler="zxz", units="rad").verdict == "right"
+
+
+BRICK = cv.Scene("brick", cv.RigidBody([2e-3, 5e-3, 6e-3]), np.eye(3), [0.5, 4.0, -0.6], 10.0)
+AT_200_HZ = np.arange(560) / 200
+FLIGHT = slice(170, 400)  # rows
+
+
+def hand(t, size, seed=1):
+    """The motion of a hand: slow sines of three frequencies in each axis, rad/s."""
+    random = np.random.default_rng(seed)
+    waves = [random.normal(size=3) * np.sin(random.uniform(3, 18) * t[:, None] + random.normal(size=3)) for _ in range(3)]
+    return size * sum(waves)
+
+
+def flight(rows, after=lambda w, t: w, w=(0.5, 4.0, -0.6), body=BRICK.body):
+    """The rates of the free body, changed by a mistake, in so many rows."""
+    t = AT_200_HZ[:rows]
+    return after(free_body(body, np.eye(3), np.array(w), t)[1], t[:, None])
+
+
+def thrown(size=0.5, count=230, **of):
+    """The hand, a flight, and the hand again."""
+    before, after = hand(AT_200_HZ[:170], size), hand(AT_200_HZ[: 560 - 170 - count], size, 2)
+    return np.vstack([before, flight(count, **of), after])
+
+
+def stepped_euler(rows):
+    w, J = [np.array([0.5, 4.0, -0.6])], BRICK.body.moments
+    for _ in range(rows - 1):
+        w.append(w[-1] + np.cross(J * w[-1], w[-1]) / J / 200)
+    return np.array(w)
+
+
+OTHER = cv.RigidBody([2.2e-3, 5e-3, 6e-3])
+KICKED = np.vstack([flight(200), flight(360, w=(0.1, 3.0, 0.9))])
+SHAKEN = np.random.default_rng(5).normal(size=(260, 3))
+RECORDED = {
+    "a throw": (thrown(), "right"),
+    "a hand that holds still": (thrown(0.01), "undecided"),
+    "two throws": (np.vstack([thrown()[:500], thrown(count=150)[140:400]]), "undecided"),
+    "the file ends in the flight": (thrown()[:400], "undecided"),
+    "only a hand": (hand(AT_200_HZ, 1.0), "wrong"),
+    "a throw of another body": (thrown(body=OTHER), "wrong"),
+    "a damped flight": (thrown(after=lambda w, t: w * np.exp(-0.2 * t)), "wrong"),
+    "a damped motion": (flight(560, after=lambda w, t: w * np.exp(-0.1 * t)), "wrong"),
+    "a kick in the middle": (KICKED, "wrong"),
+    "explicit Euler": (stepped_euler(560), "wrong"),
+    "another body": (flight(560, body=OTHER), "wrong"),
+    "asleep": (np.vstack([flight(400), np.zeros((160, 3))]), "wrong"),
+    "halted": (np.vstack([flight(400), np.repeat(flight(400)[-1:], 160, axis=0)]), "wrong"),
+    "a constant error from a row on": (flight(560) + 0.5 * (np.arange(560) >= 300)[:, None], "wrong"),
+    "noise from a row on": (
+        flight(560) + (np.arange(560) >= 300)[:, None] * np.random.default_rng(5).normal(size=(560, 3)),
+        "wrong",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", RECORDED)
+def test_a_throw_is_verified_by_its_flight_and_a_wrong_program_stays_wrong(name, tmp_path, unnamed, no_moments):
+    """Without a search for mistakes, which names most of the wrong programs before a stretch of free motion is looked for."""
+    w, expected = RECORDED[name]
+    w = w + 0.01 * np.random.default_rng(3).normal(size=w.shape)
+    table = {"time (s)": np.arange(len(w)) / 200} | {f"gyro_{axis} (rad/s)": w[:, i].round(5) for i, axis in enumerate("xyz")}
+    found = verify(tmp_path, table, scene=BRICK)
+    assert found.verdict == expected, found.sentence
+    assert (found.details.stretch is None) is (expected == "wrong")
+    if expected != "wrong":
+        first, last = found.details.stretch
+        assert abs(first - 171) <= 3 >= abs(last - 400)  # measured: 0 and 0
+        assert found.details.compared == last - first + 1
+        start, end = re.findall(r"--(?:from|until) (\S+)", found.findings[0].detail) or (0.85, 1.995)
+        assert verify(tmp_path, table, scene=BRICK, start_time=float(start), end_time=float(end)).verdict == "right"
