@@ -559,8 +559,8 @@ def _part_standstill(case: Compared, mistake: Standstill) -> Explanation | None:
     i = int(mistake.of or 0)
     if case.data[0] is None or case.data[1] is None or case.step is not None:
         return None
-    k, x = _first_still(case, i), case.data[i]
-    rest = i == 1 and bool(np.abs(x[k:]).max() <= _still_within(case)[1] * case.scale)
+    k = _first_still(case, i)
+    rest = i == 1 and bool(np.abs(case.data[1][k:]).max() <= _still_within(case)[1] * case.scale)
     if len(case.t) - k < 3 or mistake.rest != (0.0 if rest else 1.0) or (case.error[i, k:] <= case.allowed[i]).all():
         return None
     case = _until(case, k)

@@ -214,7 +214,10 @@ def _stands_alone(of: int, rest: float) -> Callable[[Compared], Rows]:
 def _resampled(mistake: Resampling) -> Callable[[Compared], Rows]:
     def change(case: Compared) -> Rows:
         spacing = SAMPLED * float(case.t[1])
-        k, times = np.floor(case.t / spacing + 1e-9).astype(int), spacing * np.arange(len(case.t) // SAMPLED + 3)
+        k, times = (
+            np.floor(case.t / spacing + 1e-9).astype(int),
+            np.array(spacing * np.arange(len(case.t) // SAMPLED + 3), float),
+        )
         samples, share = truth(case.scene.rename("longer", t_end=2 * float(times[-1])), 0.0, times), case.t / spacing - k
         made = []
         for law, x, right in zip((mistake.attitudes, mistake.rates), samples, case.exact, strict=True):
