@@ -750,16 +750,27 @@ def _turned_axes(case: Compared, asked: _Asked) -> Explanations:
     if len(case.scene.breaks) > MOST_BREAKS:
         return
     if case.data[0] is not None and not (case.from_row and case.scene.free):  # it moves equally in any axes of the world
-        best = _best_turn(case, compose(BY_KEY["turned world"]))
-        yield best and _about_vertical(case, best)
-    yield _best_turn(case, compose(BY_KEY["body axes"]))
+        yield _best_turn(case, *_turns_of_world(case))
+    yield _best_turn(case, compose(BY_KEY["body axes"]), Rotation.create_group("O").as_rotvec())
 
 
-def _best_turn(case: Compared, trial: Trial) -> Explanation | None:
-    near, turns = case.first(3.0, 10), Rotation.create_group("O").as_rotvec()
+def _turns_of_world(case: Compared) -> tuple[Trial, Array]:
+    """Return the trial of a turned world and turns to start with, of two numbers if the field is uniform."""
+    mistake = BY_KEY["turned world"]
+    if not isinstance(case.scene.potential, UniformGravity) or case.scene.loads:
+        return compose(mistake), Rotation.create_group("O").as_rotvec()
+    angles = np.arange(8) * np.pi / 4
+    around = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    turns = np.vstack([np.zeros((1, 2)), around * np.pi / 2, around[:3:2] * np.pi])
+    return compose(replace(mistake, numbers=mistake.numbers[:2], sentence=mistake.sentence.replace("{turn_3:.5g}", "0"))), turns
+
+
+def _best_turn(case: Compared, trial: Trial, turns: Array) -> Explanation | None:
+    """Return the explanation by a turn that is nearest to one of several."""
+    near, n = case.first(3.0, 10), len(turns)
     motion = trial.build(near)
     assert motion is not None
-    many = np.broadcast_to(case.scene.R_WB0, (24, 3, 3)), np.broadcast_to(case.scene.w_WB_B0, (24, 3))
+    many = np.broadcast_to(case.scene.R_WB0, (n, 3, 3)), np.broadcast_to(case.scene.w_WB_B0, (n, 3))
     left = np.linalg.norm(near.differences(*motion(*many, turns, len(near.t))), axis=(1, 2))
     explanations = [attempt(case, trial, turns[k].tolist(), most=30) for k in np.argsort(left, kind="stable")[:3]]
     shortest = [_shortest_turn(explanation) for explanation in explanations if explanation is not None]
@@ -770,20 +781,10 @@ def _best_turn(case: Compared, trial: Trial) -> Explanation | None:
     )
 
 
-def _about_vertical(case: Compared, explanation: Explanation) -> Explanation:
-    """Return a turn of the world without the turn about the vertical that gravity does not show."""
-    if not isinstance(case.scene.potential, UniformGravity) or case.scene.loads or case.scene.torque is not None:
-        return explanation
-    A = Rotation.from_rotvec([*explanation.values.values()]).as_matrix().T
-    about = Rotation.from_rotvec([0.0, 0.0, np.arctan2(A[0, 1] - A[1, 0], A[0, 0] + A[1, 1])]).as_matrix()
-    turn = Rotation.from_matrix((A @ about).T).as_rotvec().tolist()
-    return _shortest_turn(replace(explanation, values=dict(zip(explanation.values, turn, strict=True))))
-
-
 def _shortest_turn(explanation: Explanation) -> Explanation:
     """Return an explanation by a turn of at most half a revolution."""
-    turn = Rotation.from_rotvec([*explanation.values.values()]).as_rotvec().tolist()
-    values, trial = dict(zip(explanation.values, turn, strict=True)), explanation.trial
+    turn = Rotation.from_rotvec([*explanation.values.values(), 0.0][:3]).as_rotvec().tolist()
+    values, trial = dict(zip(explanation.values, turn, strict=False)), explanation.trial
     return replace(explanation, values=values, sentence=explanation.sentence if trial is None else trial.sentence(values))
 
 

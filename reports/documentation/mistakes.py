@@ -26,13 +26,14 @@ from conservative.benchmarks.verification.explain import PROGRAM_KINDS
 from conservative.benchmarks.verification.explanation import Trial
 from conservative.benchmarks.verification.find_steps import by_step
 from conservative.benchmarks.verification.mistakes import BY_KEY
-from conservative.benchmarks.verification.mistakes.attitudes import Rule
+from conservative.benchmarks.verification.mistakes.attitudes import Drift, Rule
 from conservative.benchmarks.verification.mistakes.bodies import FITTED, LOADED, BodyMistake, FittedBodyMistake
 from conservative.benchmarks.verification.mistakes.equations import EquationsMistake
-from conservative.benchmarks.verification.mistakes.habits import Habit, RowHabit
+from conservative.benchmarks.verification.mistakes.habits import Habit, RowHabit, Standstill
 from conservative.benchmarks.verification.mistakes.mistake import Mistake
 from conservative.benchmarks.verification.mistakes.readings import Reading
-from conservative.benchmarks.verification.mistakes.scenes import SceneMistake
+from conservative.benchmarks.verification.mistakes.samples import RESAMPLED, Resampling
+from conservative.benchmarks.verification.mistakes.scenes import SceneDigits, SceneMistake
 from conservative.benchmarks.verification.mistakes.steps import Integrator
 from conservative.benchmarks.verification.mistakes.times import RowTimes, Time
 from conservative.benchmarks.verification.motions import files
@@ -40,7 +41,7 @@ from conservative.benchmarks.verification.motions.motion import load
 from conservative.benchmarks.verification.recordings.table import Recording
 from conservative.benchmarks.verification.recordings.verdict import verify_recording
 from conservative.benchmarks.verification.solution import truth
-from conservative.benchmarks.verification.trials import by_habit, by_rule, compose
+from conservative.benchmarks.verification.trials import by_drift, by_habit, by_rule, compose
 from conservative.errors import Unsupported
 from conservative.grid import Grid
 from conservative.scene import Scene
@@ -68,8 +69,18 @@ OF_LOADERS, NO_MOTION = "only a loader has it", "a model file has no motion"
 """Reasons why a mistake cannot be seen in a motion, and in a model file."""
 NO_CLOCK = "a program has no clock: its samples are after steps"
 """Reason why a program does not have a mistake of time stamps."""
+OF_RECORDERS = "a recorder or a filter has it, which a program does not use"
+"""Reason why a program does not have a mistake of the part of rows that is recorded."""
+ALL_DIGITS = "a program gets numbers with all digits"
+"""Reason why a program does not have a rounded scene."""
+SAMPLED = 4
+"""Rows from sample to sample of a recorder that repeats or interpolates samples."""
 PARTS, MOTIONS = 2, 6
 """Steps between two rows, and exact motions that a mistake of a program is planted in."""
+
+
+WITH_DIGITS = "digits"
+"""Name of the scene with numbers that may have been rounded."""
 
 
 def scenes() -> list[Scene]:
@@ -85,7 +96,9 @@ def scenes() -> list[Scene]:
     turning = free.rename("turning", potential=cv.Turning(field, cv.Orbit(0.4, [0.3, 0.2, 0.9])))
     tiny = Scene("tiny", cv.RigidBody([4e-7, 9e-7, 1.2e-6]), *start, float(T[-1]))
     motor = cv.RigidBody(body.inertia, rotor_momentum=([0.0, 6.0], [[0.0, 0.0, 0.2], [0.0, 0.3, 0.9]]))
-    return [free, heavy, rotor, free.rename("torque", torque=torque), damped, turning, tiny, free.rename("motor", body=motor)]
+    digits = free.rename(WITH_DIGITS, body=cv.RigidBody(body.inertia, rotor_momentum=[0.51234, -0.31234, 0.81234]))
+    driven = [free.rename("torque", torque=torque), damped, turning, tiny, free.rename("motor", body=motor)]
+    return [free, heavy, rotor, *driven, digits]
 
 
 NUMBERS: Mapping[str, float] = {
@@ -102,6 +115,10 @@ NUMBERS: Mapping[str, float] = {
         "bias_1": 0.02,
         "bias_2": -0.03,
         "bias_3": 0.01,
+        "drift_1": 0.02,
+        "drift_2": -0.05,
+        "drift_3": 0.03,
+        "drift": 0.1,
     },
     **{"limit": 1.9, "band": 0.3, "time": 3.01},
 }
@@ -146,6 +163,8 @@ def trial_of(mistake: Mistake) -> Trial | None:
             return by_step(mistake, PARTS)
         case Rule():
             return by_rule(mistake, PARTS)
+        case Drift():
+            return by_drift(mistake)
         case Habit():
             return by_habit(mistake, T[1] / PARTS)
         case Reading() | Time() | SceneMistake() | EquationsMistake():
@@ -184,6 +203,39 @@ def _signs(case: Compared) -> Array:
     return np.append(False, (q[1:] * q[:-1]).sum(axis=1) < 0)
 
 
+def _stands_alone(of: int, rest: float) -> Callable[[Compared], Rows]:
+    def change(case: Compared) -> Rows:
+        still = _stands(NUMBERS["time"], rest)(case)
+        return (still[0], case.exact[1]) if of == 0 else (case.exact[0], still[1])
+
+    return change
+
+
+def _resampled(mistake: Resampling) -> Callable[[Compared], Rows]:
+    def change(case: Compared) -> Rows:
+        spacing = SAMPLED * float(case.t[1])
+        k, times = (
+            np.floor(case.t / spacing + 1e-9).astype(int),
+            np.array(spacing * np.arange(len(case.t) // SAMPLED + 3), float),
+        )
+        samples, share = truth(case.scene.rename("longer", t_end=2 * float(times[-1])), 0.0, times), case.t / spacing - k
+        made = []
+        for law, x, right in zip((mistake.attitudes, mistake.rates), samples, case.exact, strict=True):
+            made.append(right if law is None else law(share, x[k], x[k + 1]))
+        return made[0], made[1]
+
+    return change
+
+
+def _rounded_scene(case: Compared) -> Rows:
+    """Return the motion of the scene with a rotor of five digits, before it was rounded; of other scenes the right motion."""
+    rotor = case.scene.body.rotor_momentum
+    if case.scene.name != WITH_DIGITS or rotor is None:
+        return case.exact
+    before = cv.RigidBody(case.scene.body.inertia, rotor + np.array([4e-6, -3e-6, 2e-6]))
+    return truth(case.scene.rename("before", body=before), 0.0, case.t)
+
+
 def _other_times(change: Callable[[Array], Array]) -> Callable[[Compared], Rows]:
     return lambda case: truth(case.scene, 0.0, change(case.t))
 
@@ -208,6 +260,11 @@ def _single_rows(case: Compared) -> Rows:
 BY_HAND: Mapping[str, Callable[[Compared], Rows]] = {
     "sleep": _stands(NUMBERS["time"], 0.0),
     "halt": _stands(NUMBERS["time"], 1.0),
+    "frozen attitudes": _stands_alone(0, 1.0),
+    "frozen rates": _stands_alone(1, 1.0),
+    "rates of 0": _stands_alone(1, 0.0),
+    **{mistake.key: _resampled(mistake) for mistake in RESAMPLED},
+    "digits of the scene": _rounded_scene,
     "frozen motion": lambda case: (np.repeat(case.exact[0][:1], len(case.t), 0), np.repeat(case.exact[1][:1], len(case.t), 0)),
     **{name: _some(_fifth, name) for name, mistake in BY_KEY.items() if isinstance(mistake, RowHabit) and mistake.periodic},
     "rates at sign changes": _some(_signs, "rates at sign changes"),
@@ -274,6 +331,10 @@ def not_of_programs(mistake: Mistake) -> str:
         return OF_LOADERS
     if mistake.kind not in PROGRAM_KINDS:
         return UNSEEN[mistake.kind]
+    if isinstance(mistake, Drift) or (isinstance(mistake, Standstill) and mistake.of is not None):
+        return OF_RECORDERS
+    if isinstance(mistake, SceneDigits):
+        return ALL_DIGITS
     of_clock = isinstance(mistake, RowTimes) or (isinstance(mistake, Time) and not mistake.of_step and not mistake.unit)
     return NO_CLOCK if of_clock else ""
 

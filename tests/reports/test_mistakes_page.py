@@ -9,7 +9,8 @@ from conservative.reports.documentation import mistakes
 
 ROWS = mistakes.read_rows()
 REASONS = {
-    *mistakes.UNSEEN.values(), mistakes.OF_LOADERS, mistakes.NO_MOTION, mistakes.NO_CLOCK, "it does not change the rates",
+    *mistakes.UNSEEN.values(), mistakes.OF_LOADERS, mistakes.NO_MOTION, mistakes.NO_CLOCK, mistakes.OF_RECORDERS,
+    mistakes.ALL_DIGITS, "it does not change the rates",
     "no exact motion shows it", "rates of a body in a field do not determine its motion",
 }  # fmt: skip
 QUICK = ("transposed",)

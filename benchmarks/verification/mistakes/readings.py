@@ -216,8 +216,8 @@ READINGS = (
     Reading(
         "turned world",
         "The attitudes are relative to a world that is turned by ({turn_1:.5g}, {turn_2:.5g}, {turn_3:.5g}) rad",
-        attitude(lambda R, *turn: Rotation.from_rotvec(turn).as_matrix() @ R),
-        attitude(lambda R, *turn: Rotation.from_rotvec(turn).as_matrix().T @ R),
+        attitude(lambda R, *turn: _tilt(*turn) @ R),
+        attitude(lambda R, *turn: _tilt(*turn).T @ R),
         ATTITUDES,
         of_world=True,
         numbers=TURN,
@@ -231,6 +231,11 @@ READINGS = (
         numbers=TURN,
     ),
 )  # fmt: skip
+
+
+def _tilt(first: float, second: float, third: float = 0.0) -> Array:
+    """Return the matrix of a turn; without the third number the turn about the vertical, which gravity does not show, is 0."""
+    return Rotation.from_rotvec([first, second, third]).as_matrix()
 
 
 def _body_axes(R: Array | None, w: Array | None, C: Array) -> States:
