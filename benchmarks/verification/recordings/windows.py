@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.integrate import cumulative_simpson
@@ -69,7 +70,7 @@ def find_stretch(case: Compared) -> Stretch | None:
     with np.errstate(all="ignore"):
         L = w @ body.inertia
         # Without a torque, the momentum in body axes minus the integral of L x w is constant.
-        constant = np.linalg.solve(body.inertia, (L - cumulative_simpson(np.cross(L, w), x=t, axis=0, initial=0.0)).T).T
+        constant: Any = np.linalg.solve(body.inertia, (L - cumulative_simpson(np.cross(L, w), x=t, axis=0, initial=0.0)).T).T
     if not np.isfinite(constant).all():
         return None
     mean = max(MEAN, min(int(ANGLE / case.gap), len(t) // PART))
@@ -110,7 +111,8 @@ def _longest(free: Array, turns: Array) -> tuple[int, int]:
 
 def _refine(case: Compared, first: int, last: int, noise: float, forced: Array, turns: Array, mean: int) -> Stretch | None:
     """Return the stretch around rows without a torque whose rows are explained by one start, and whether it decides."""
-    n, relative = len(case.t), noise / case.scale
+    n, relative, w = len(case.t), noise / case.scale, case.data[1]
+    assert w is not None
     own = allow((0.0, 0.0), (float(case.noise[0]), relative))
 
     def part(a: int, b: int) -> Compared:
@@ -123,13 +125,13 @@ def _refine(case: Compared, first: int, last: int, noise: float, forced: Array, 
     if not started.passes(started.error):
         return None
     # The same motion before and after.
-    limit, speed = SIGMAS * relative, np.linalg.norm(case.data[1], axis=1)
+    limit, speed = SIGMAS * relative, np.linalg.norm(w, axis=1)
     typical = float(np.median(speed[first:last])) / case.scale
     reach = max(MEAN, min(int(WITHIN * (last - first)), int(TURN / case.gap)))
     sides = []
     for rows in (np.arange(first)[::-1], np.arange(last, n)):
         total, rows = len(rows), rows[: 2 * len(inner.t)]
-        difference = _differences(started, case.t[rows] - case.t[first], case.data[1][rows])
+        difference = _differences(started, case.t[rows] - case.t[first], w[rows])
         error = np.linalg.norm(difference, axis=1)
         means = np.convolve(np.append(0.0, error), np.full(MEAN, 1 / MEAN))[1 : len(error) + 1]
         off = np.flatnonzero((error > limit) | (means > LEAVE * relative))
