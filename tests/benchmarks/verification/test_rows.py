@@ -363,5 +363,5 @@ def test_what_a_recording_is_stands_before_its_verdict(tmp_path):
     first, second = found.details.lines
     assert all(text in first for text in ("110 rows over 6", "2 gaps, the longest 0.5", "varies by", "changes its sign"))
     assert all(text in second for text in ("Attitudes rounded to 2e-6 rad", "rates with noise of 0.0"))
-    plain = verify(tmp_path, {"t": T} | MOTION).details.lines
-    assert plain == ("121 rows over 6 s at 20 Hz.", "Attitudes in double precision and rates in double precision.")
+    plain = verify(tmp_path, {"t": T} | RATES).details.lines
+    assert plain == ("121 rows over 6 s at 20 Hz.", "Rates in double precision.")
