@@ -334,12 +334,16 @@ class Compared:
         """Return the root of the mean square of errors, in units of the noise."""
         return float(np.sqrt((error**2).mean(axis=1) / self.noise**2).max())
 
+    def work(self, bodies: int) -> float:
+        """Return the work (`Effort`) of a number of motions over the rows."""
+        corners = int(np.searchsorted(self.scene.breaks, self.t[-1])) if len(self.scene.breaks) else 0
+        stretches = 1 + self.turned / ANGLE + corners
+        return weigh(self.scene) * stretches * (1 + bodies) / 2 + bodies * len(self.t) / ROWS_OF_EFFORT
+
     def evaluate(self, motion: Solution, many: Array) -> tuple[Array, Array]:
         """Return motions (B, n, 3, 3), (B, n, 3) of changes of the initial state and other numbers, (B, 6 + k)."""
         turns = Rotation.from_rotvec(many[:, :3]).as_matrix()
-        corners = int(np.searchsorted(self.scene.breaks, self.t[-1])) if len(self.scene.breaks) else 0
-        stretches, bodies = 1 + self.turned / ANGLE + corners, len(many)
-        self.effort.spend(weigh(self.scene) * stretches * (1 + bodies) / 2 + bodies * len(self.t) / ROWS_OF_EFFORT)
+        self.effort.spend(self.work(len(many)))
         return motion(self.scene.R_WB0 @ turns, self.scene.w_WB_B0 + many[:, 3:6] * self.scale, many[:, 6:], len(self.t))
 
     def equations(self, scene: Scene | None = None, gyroscopic: float = 1.0, **changes: Any) -> Equations:
@@ -375,10 +379,14 @@ class Compared:
         n = len(self.t)
 
         # More and more rows: a motion that multiplies small changes is not linear in its start over all rows.
+        noise = np.where(self.open, HOPELESS * MOST_NOISE, 0.0)
+        most_left = max(HOPELESS, float((np.maximum(self.allowed, noise) / self.noise).max()))
         rows = [n] if not free else [k for k in (n // 64, n // 16, n // 4) if k >= 8] + [n]
         for k in rows if moved else ():
+            if self.take(slice(0, k)).work(len(moved)) > self.effort.left:
+                break
             p, cost = self._improve(motion, p, k, moved, small, most)
-            if free and cost > k * max(HOPELESS, (self.allowed / self.noise).max()) ** 2:
+            if free and cost > k * most_left**2:
                 break  # no start explains these rows, so none explains more
         R, w = self.evaluate(motion, p[None])
         return p[:6], p[6:], (R[0], w[0])
@@ -411,7 +419,7 @@ class Compared:
             axes, triangle = np.linalg.qr(slopes.T)  # normal equations would square how much the motion multiplies
             sizes = np.diag(np.linalg.norm(slopes, axis=1) + 1e-150)
             goal = np.concatenate([-axes.T @ now, np.zeros(len(moved))])
-            while damping < 1e3 and not better:  # a larger damping makes steps of no use
+            while damping < 1e3 and not better and not self.effort.over:  # a larger damping makes steps of no use
                 step = np.linalg.lstsq(np.vstack([triangle, np.sqrt(damping) * sizes]), goal, rcond=1e-15)[0]
                 q = p.copy()
                 q[moved] += step
@@ -505,7 +513,8 @@ def differ(R0: Array, w0: Array, R: Array, w: Array, scale: float) -> Array:
     turn = np.nan_to_num(np.swapaxes(R0, -1, -2) @ R) + 0.0
     turn[np.abs(np.linalg.det(turn)) < 0.5] = np.eye(3)
     vector = Rotation.from_matrix(turn.reshape(-1, 3, 3)).as_rotvec().reshape(*turn.shape[:-2], 3)
-    return np.concatenate([vector, np.nan_to_num(w - w0) / scale], axis=-1)
+    with np.errstate(over="ignore"):
+        return np.concatenate([vector, np.clip(np.nan_to_num(w - w0) / scale, -HUGE, HUGE)], axis=-1)
 
 
 def count_linear(differences: Array) -> int:

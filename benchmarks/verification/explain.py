@@ -13,15 +13,32 @@ from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
 from conservative.attitude import Array, angle_between, to_quaternion
+from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 
-from .compare import LINEAR, LONGEST, NUMERICAL, Compared, Effort, Solution, differ, exact, linearise
+from .compare import (
+    FLOOR,
+    HOPELESS,
+    LINEAR,
+    LONGEST,
+    MOST_NOISE,
+    NUMERICAL,
+    SIGMAS,
+    Compared,
+    Effort,
+    Solution,
+    allow,
+    differ,
+    estimate_noise,
+    exact,
+    linearise,
+)
 from .explanation import HALF, PROVEN, Explanation, Trial, attempt, explain
 from .find_steps import PARTS, STEPS_AT_MOST, Linearised, by_step, find_steps
 from .mistakes import BY_KEY
 from .mistakes.attitudes import DRIFTS, RULES, Drift, align, integrate
 from .mistakes.equations import EQUATIONS
-from .mistakes.habits import HABITS, ROWS, STANDSTILLS, Standstill
+from .mistakes.habits import HABITS, PART_STANDSTILLS, ROWS, STANDSTILLS, Standstill
 from .mistakes.mistake import Number
 from .mistakes.readings import ATTITUDES, AXES, RATES, READINGS, Reading
 from .mistakes.scenes import PARTS as SCENE_PARTS
@@ -29,6 +46,7 @@ from .mistakes.scenes import SCENES, SIZES, SceneMistake, with_inertia
 from .mistakes.steps import INTEGRATORS
 from .mistakes.times import DROPPED, JITTERED, TIMES
 from .resampled import find_resampled
+from .scene_digits import find_scene_digits
 from .solution import Equations, has_closed_form, integrate_rates, truth
 from .trials import Drifting, by_drift, by_habit, by_rule, compose, fits, remark_on_damping
 
@@ -83,7 +101,8 @@ def diagnose(
     same on a busy machine.
     """
     whole = _before_divergence(whole)
-    case = whole.first(LONGEST, FEWEST).first(NUMERICAL, 2)  # 100 rad, or 100 rows if they take longer; at most 5000 rad
+    case = whole.first(LONGEST, FEWEST)  # 100 rad, or 100 rows if they take longer
+    case = case.first(NUMERICAL, 2) if has_closed_form(case.scene) else case.first(NUMERICAL / 10, 4)
     if case.error.max() <= case.allowed.max() and len(case.t) < len(whole.t):
         case = whole  # the error is later
     stride = -(-len(case.t) // MOST)
@@ -199,8 +218,36 @@ def _readings(case: Compared, asked: _Asked) -> Explanations:
         R, w = motion(near.scene.R_WB0[None], near.scene.w_WB_B0[None], np.zeros((1, 0)), len(near.t))
         # A reading that makes the first rows much worse than they are is not tried on all rows.
         if (near.errors(R[0], w[0]) <= 2 * case.error[:, :10].max() + 10 * case.allowed.max()).all():
-            explanation = attempt(case, trial)
+            explanation = _read_again(case, trial) if any(case.open) else attempt(case, trial)
             yield explanation if _moves(case, explanation) else None
+
+
+def _read_again(case: Compared, trial: Trial) -> Explanation | None:
+    """Return the explanation by other readings, of rows whose noise they show only if they are read so; None if they do not.
+
+    Rates in degrees that are read as rad/s turn the body so far between two rows that noise is hidden.
+    """
+    R, w = case.data
+    for reading in trial.mistakes:
+        assert isinstance(reading, Reading)
+        R, w = reading.read(R, w)
+    again, motion = case.read(R, w), trial.build(case)
+    scale = case.scale if w is None else float(np.linalg.norm(w, axis=1).max()) or 1.0
+    noise, resolved = estimate_noise(case.t, again.data)
+    have = np.array([x is not None for x in again.data])
+    if not resolved[have].all() or (noise / [1.0, scale] > MOST_NOISE).any():
+        return None
+    allowed = allow(case.rounded, noise / [1.0, scale])
+    again = replace(again, scale=scale, allowed=allowed.errors, noise=allowed.noise, open=(False, False))
+    if not again.passes(again.error) and (again.error.max(axis=1) < HOPELESS * again.allowed).all():
+        again = again.at(again.fit(exact(again), np.zeros(0), np.zeros(0))[0])
+    if not again.passes(again.error) or motion is None:
+        return None
+    made = motion(case.scene.R_WB0[None], case.scene.w_WB_B0[None], np.zeros((1, 0)), len(case.t))
+    explanation = explain(case, trial, (made[0][0], made[1][0]))
+    left = (again.error.max(axis=1) * [1.0, scale / case.scale]).tolist()
+    share = float(max(left) / max(*explanation.plain, 1e-15))
+    return replace(explanation, left=left, share=share, rest=share, size=again.size(again.error), explains=share < HALF)
 
 
 def _changes(case: Compared, asked: _Asked) -> Explanations:
@@ -476,6 +523,8 @@ def _habits(case: Compared, asked: _Asked) -> Explanations:
     """Yield motions whose state is changed after each step, or that stand still."""
     for standstill in STANDSTILLS:
         yield _standstill(case, standstill)
+    for standstill in PART_STANDSTILLS:
+        yield _part_standstill(case, standstill)
     w = case.data[1]
     if w is None or len(case.scene.breaks) > MOST_BREAKS:
         return
@@ -527,16 +576,66 @@ def _rates_before(case: Compared) -> Array:
     return np.vstack([case.exact[1][:1], made])
 
 
+def _still_within(case: Compared) -> Array:
+    """Return the changes (2,) of attitudes, rad, and relative rates that a body that stands still has by its noise."""
+    return np.where(case.noise * SIGMAS > np.maximum(case.rounded, FLOOR), 2 * SIGMAS * case.noise, STILL)
+
+
+def _first_still(case: Compared, i: int) -> int:
+    """Return the first row from which attitudes (0) or rates (1) stand still, as in the last row."""
+    x = case.data[i]
+    assert x is not None
+    apart = np.abs(x - x[-1]).reshape(len(x), -1).max(axis=1) / (case.scale if i else 1.0)
+    going = np.flatnonzero(apart > _still_within(case)[i])
+    return int(going[-1]) + 1 if len(going) else 0
+
+
+def _until(case: Compared, k: int) -> Compared:
+    """Return the case whose initial state fits the rows before one of them, and is not fitted to the others."""
+    before = case.take(slice(0, k))
+    if not case.free or k < 4:
+        return case
+    return replace(case.at(before.fit(exact(before), np.zeros(0), np.zeros(0))[0]), free=())
+
+
+def _part_standstill(case: Compared, mistake: Standstill) -> Explanation | None:
+    """Return the explanation by attitudes or rates that stand still from a time on while the others go on."""
+    i = int(mistake.of or 0)
+    if case.data[0] is None or case.data[1] is None or case.step is not None:
+        return None
+    k, x = _first_still(case, i), case.data[i]
+    assert x is not None
+    rest = i == 1 and bool(np.abs(x[k:]).max() <= _still_within(case)[1] * case.scale)
+    if len(case.t) - k < 3 or mistake.rest != (0.0 if rest else 1.0) or (case.error[i, k:] <= case.allowed[i]).all():
+        return None
+    case = _until(case, k)
+
+    def build(of: Compared) -> Solution | None:
+        motion, equations = exact(of), of.equations()
+
+        def frozen(R: Array, w: Array, p: Array, n: int) -> tuple[Array, Array]:
+            t = np.minimum(of.t[:n], np.clip(p[:, :1], of.start, None))
+            last = equations.flow(of.start, R, w, float(max(t.max(), of.start)) + 1e-9 * (of.t[-1] - of.start)).at_own_times(t)
+            going = motion(R, w, np.zeros((len(R), 0)), n)
+            rates = np.where((of.t[:n] > p[:, :1])[..., None], mistake.rest, 1.0) * last[1]
+            return (last[0], going[1]) if i == 0 else (going[0], rates)
+
+        return frozen
+
+    trial = Trial((mistake,), build, mistake.numbers, anew=lambda other: _part_standstill(other, mistake))
+    if k == 0 or rest:
+        stop = float(case.t[k])  # between two rows
+        known = {"time": stop}
+        explanation = attempt(case, _at_numbers(trial, (0.5 * (stop + case.t[k - 1]) if k else stop,)), known=known)
+        return None if explanation is None else replace(explanation, trial=trial, numbers=min(k, 1))
+    return attempt(case, trial, [float(case.t[k - 1] + case.t[k]) / 2])
+
+
 def _standstill(case: Compared, mistake: Standstill) -> Explanation | None:
     """Return the explanation by a body that stands still from a time on; None if the rows do not."""
     R, w = case.data
-    moved = np.zeros(len(case.t) - 1)
-    for x, scale in ((R, 1.0), (w, case.scale)):
-        if x is not None:
-            moved = np.maximum(moved, np.abs(np.diff(x, axis=0)).reshape(len(moved), -1).max(axis=1) / scale)
-    going = np.flatnonzero(moved > STILL)
-    k = int(going[-1]) + 1 if len(going) else 0
-    rest = w is None or bool(np.abs(w[k:]).max() <= STILL * case.scale)
+    k = max(_first_still(case, i) for i in range(2) if case.data[i] is not None)
+    rest = w is None or bool(np.abs(w[k:]).max() <= _still_within(case)[1] * case.scale)
     if (
         len(case.t) - k < 3
         or (w is not None and mistake.rest != (0.0 if rest else 1.0))
@@ -547,7 +646,7 @@ def _standstill(case: Compared, mistake: Standstill) -> Explanation | None:
     stays_at_start = R is not None and k == 0 and case.apart((np.broadcast_to(R[0], R.shape), start[1]), start)[0] <= STILL
     if mistake.from_start != stays_at_start or (R is None and not rest):
         return None
-    stop = float(case.t[k])
+    stop, case = float(case.t[k]), _until(case, k)
 
     def build(of: Compared) -> Solution | None:
         equations = of.equations()
@@ -635,7 +734,8 @@ def _turned_axes(case: Compared, asked: _Asked) -> Explanations:
     if len(case.scene.breaks) > MOST_BREAKS:
         return
     if case.data[0] is not None and not (case.from_row and case.scene.free):  # it moves equally in any axes of the world
-        yield _best_turn(case, compose(BY_KEY["turned world"]))
+        best = _best_turn(case, compose(BY_KEY["turned world"]))
+        yield best and _about_vertical(case, best)
     yield _best_turn(case, compose(BY_KEY["body axes"]))
 
 
@@ -652,6 +752,16 @@ def _best_turn(case: Compared, trial: Trial) -> Explanation | None:
         key=lambda explanation: (round(explanation.share, 3), np.linalg.norm([*explanation.values.values()])),
         default=None,
     )
+
+
+def _about_vertical(case: Compared, explanation: Explanation) -> Explanation:
+    """Return a turn of the world without the turn about the vertical that gravity does not show."""
+    if not isinstance(case.scene.potential, UniformGravity) or case.scene.loads or case.scene.torque is not None:
+        return explanation
+    A = Rotation.from_rotvec([*explanation.values.values()]).as_matrix().T
+    about = Rotation.from_rotvec([0.0, 0.0, np.arctan2(A[0, 1] - A[1, 0], A[0, 0] + A[1, 1])]).as_matrix()
+    turn = Rotation.from_matrix((A @ about).T).as_rotvec().tolist()
+    return _shortest_turn(replace(explanation, values=dict(zip(explanation.values, turn, strict=True))))
 
 
 def _shortest_turn(explanation: Explanation) -> Explanation:
@@ -945,12 +1055,13 @@ class Search:
 SEARCHES = {
     "units of time": Search(_units, frozenset({"times"}), 0.05, ends=True, whole=True, least=1),
     "other equations": Search(_changes, frozenset({"scenes", "equations"}), 0.3),
-    "other readings": Search(_readings, frozenset({"readings"}), 0.1, ends=True),
+    "other readings": Search(_readings, frozenset({"readings"}), 0.2, ends=True),
     "habits": Search(_habits, frozenset({"habits"}), 0.1, least=1),
     "resampled rows": Search(lambda case, asked: find_resampled(case), frozenset({"rows"}), 0.05, ends=True, whole=True),
     "wrong rows": Search(_rows, frozenset({"rows"}), 0.01, ends=True),
     "other times": Search(_times, frozenset({"times"}), 0.1),
     "axes and sizes of rates": Search(_sensors, frozenset({"readings"}), 0.1),
+    "digits of the scene": Search(lambda case, asked: find_scene_digits(case), frozenset({"scenes"}), 0.05, ends=True),
     "fitted numbers": Search(_numbers, frozenset({"scenes", "equations"}), 0.15),
     "attitudes from rates": Search(_attitudes, frozenset({"attitudes"}), 0.3, ends=True),
     "drifting attitudes": Search(_drifts, frozenset({"attitudes"}), 0.1, ends=True),

@@ -44,7 +44,9 @@ class Measured(float):
         """Return the number with as many digits as its interval has, and the interval."""
         if not self.interval > EXACT * max(abs(self), 1e-3):
             return format(0.0 if abs(self) <= self.interval else float(self), spec)
-        digits = math.floor(math.log10(abs(self) or self.interval)) - math.floor(math.log10(self.interval)) + 1
+        if abs(self) < 0.1 * self.interval:
+            return f"0 ± {self.interval:.1g}"
+        digits = math.floor(math.log10(abs(self))) - math.floor(math.log10(self.interval)) + 1
         sign = "+" if spec.startswith("+") else ""
         return f"{float(self):{sign}.{max(1, digits)}g} ± {self.interval:.1g}"
 
@@ -134,7 +136,11 @@ class Explanation:
         intervals = 2 * case.deviations(motion, np.array([*[0.0] * 6, *values]), INTERVAL)[6:]
         if not np.isfinite(intervals).all():
             return self
-        measured = {number.name: Measured(x, d) for number, x, d in zip(trial.numbers, values, intervals.tolist(), strict=True)}
+        measured = {
+            number.name: Measured(x, d)
+            for number, x, d in zip(trial.numbers, values, intervals.tolist(), strict=True)
+            if d < max(1.0, abs(x))  # the rows do not determine the others
+        }
         known = self.values | measured
         return replace(self, values=known, sentence=self.sentence.replace(trial.sentence(self.values), trial.sentence(known)))
 

@@ -22,11 +22,11 @@ from types import MappingProxyType
 from .attitudes import DRIFTS, RULES
 from .bodies import FITTED, LOADED
 from .equations import EQUATIONS
-from .habits import HABITS, OTHER_ROWS, ROWS, STANDSTILLS
+from .habits import HABITS, OTHER_ROWS, PART_STANDSTILLS, ROWS, STANDSTILLS
 from .mistake import Mistake
 from .readings import READINGS
 from .samples import RESAMPLED
-from .scenes import BODIES, SCENES
+from .scenes import BODIES, DIGITS, SCENES
 from .steps import INTEGRATORS
 from .times import ROW_TIMES, TIMES
 
@@ -42,8 +42,8 @@ def table_of(mistakes: Iterable[Mistake]) -> Mapping[str, Mistake]:
 
 
 BY_KEY = table_of([
-    *READINGS, *TIMES, *ROW_TIMES, *SCENES, *BODIES, *EQUATIONS, *INTEGRATORS, *RULES, *DRIFTS,
-    *HABITS, *STANDSTILLS, *ROWS, *OTHER_ROWS, *RESAMPLED, *FITTED,
+    *READINGS, *TIMES, *ROW_TIMES, *SCENES, DIGITS, *BODIES, *EQUATIONS, *INTEGRATORS, *RULES, *DRIFTS,
+    *HABITS, *STANDSTILLS, *PART_STANDSTILLS, *ROWS, *OTHER_ROWS, *RESAMPLED, *FITTED,
     *(mistake for mistake in LOADED if mistake.key not in {scene_mistake.key for scene_mistake in SCENES}),
 ])  # fmt: skip
 """All mistakes by key. Dropped products of inertia are in `SCENES` and in `LOADED`: one mistake with an effect on each kind."""

@@ -36,12 +36,14 @@ class Habit(Mistake):
 class Standstill(Mistake):
     """The body stands still from a time on, which is found in each recording.
 
-    `rest` is the factor of the rates from then on. `from_start` is True if the body never moves.
+    `rest` is the factor of the rates from then on. `from_start` is True if the body never moves. `of` says which rows stand
+    still: all, or only attitudes (0) or rates (1), while the others go on.
     """
 
     kind: ClassVar[str] = "habits"
     rest: float
     from_start: bool = False
+    of: int | None = None
 
 
 @dataclass(frozen=True)
@@ -191,6 +193,16 @@ STANDSTILLS = (
         numbers=(Number("time", unit="s"),),
     ),
     Standstill("frozen motion", "The motion is frozen: attitude and rates stay as at the start", 1.0, True),
+)
+PART_STANDSTILLS = tuple(
+    Standstill(
+        key, f"{what} from {{time:.6g}} s on, while the {others} go on", rest, of=of, numbers=(Number("time", unit="s"),)
+    )
+    for key, what, others, rest, of in (
+        ("frozen attitudes", "The attitudes stand still", "rates", 1.0, 0),
+        ("frozen rates", "The rates stay the same", "attitudes", 1.0, 1),
+        ("rates of 0", "The rates are 0", "attitudes", 0.0, 1),
+    )
 )
 ROWS = (
     RowHabit("held rows", "One in {period:.0f} rows repeats the one before, from row {first:.0f} on", _held),

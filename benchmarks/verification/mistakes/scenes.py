@@ -262,6 +262,16 @@ class OtherBody(Mistake):
     kind: ClassVar[str] = "bodies"
 
 
+@dataclass(frozen=True)
+class SceneDigits(Mistake):
+    """The motion of a scene whose numbers were rounded when they were written."""
+
+    kind: ClassVar[str] = "scenes"
+
+
+DIGITS = SceneDigits(
+    "digits of the scene", "It is the motion of the scene within the digits of its numbers: more digits of {text} explain it"
+)
 BODIES = (
     OtherBody("other moments", "It is the motion of another body. {text}", option="correct --body"),
     OtherBody("another body", "It is the motion of another body, with {text}", option="correct --body"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import permutations
 from typing import Any, ClassVar
 
 import numpy as np
@@ -169,6 +170,131 @@ def _buss(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array], order: in
     return new
 
 
+def _iterate(next_one: Callable[[Array], Array], first: Array) -> Array:
+    """Return the fixed point of an implicit step."""
+    for _ in range(MOST_ITERATIONS):
+        before, first = first, next_one(first)
+        if np.abs(first - before).max() <= 2e-16 * np.abs(first).max():
+            break
+    return first
+
+
+def _cayley(turn: Array) -> Array:
+    """Return the rotation vectors (3, ...) whose Cayley maps have the vectors 2 tan(angle/2) along the axis."""
+    size = np.sqrt((turn * turn).sum(axis=0))
+    return turn * 2 * np.arctan(size / 2) / np.where(size == 0, 1.0, size)
+
+
+def _carry(turn: Array, v: Array) -> Array:
+    """Return vectors in body axes, such as the momentum, in the axes of a body that is turned by rotation vectors."""
+    size = np.sqrt((turn * turn).sum(axis=0))
+    axis, side = turn / np.where(size == 0, 1.0, size), np.cos(size)
+    return side * v - np.sin(size) * cross(axis, v) + (1 - side) * (axis * v).sum(axis=0) * axis
+
+
+class _Body:
+    """Momentum and torque of states (7, ...) in body axes, from a slope."""
+
+    def __init__(self, f: Slope) -> None:
+        self.f, self.J = f, f.body.inertia
+        self.rotor = np.zeros(3) if f.body.rotor_momentum is None else f.body.rotor_momentum
+
+    def times(self, matrix: Array, v: Array) -> Array:
+        return (matrix @ v.reshape(3, -1)).reshape(v.shape)
+
+    def momentum(self, y: Array) -> Array:
+        return self.times(self.J, y[4:]) + self.rotor.reshape(3, *(1,) * (y.ndim - 1))
+
+    def rates(self, L: Array) -> Array:
+        return self.times(np.linalg.inv(self.J), L - self.rotor.reshape(3, *(1,) * (L.ndim - 1)))
+
+    def torque(self, t: Any, y: Array) -> Array:
+        return self.times(self.J, self.f(t, y)[4:]) - cross(self.momentum(y), self.f.rates(t, y))
+
+
+def _mean_momentum(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array], turn_of: Callable[[Array], Array]) -> Array:
+    """Return the state of a method that turns by the mean of the rates of both ends, and keeps the momentum in world axes."""
+    body = _Body(f)
+    pushed = body.momentum(y) + h / 2 * body.torque(t, y)
+
+    def improve(new: Array) -> Array:
+        turn = turn_of(h * (y[4:] + new[4:]) / 2)
+        out = np.concatenate([_rotate(y[:4], turn), new[4:]])
+        out[4:] = body.rates(_carry(turn, pushed) + h / 2 * body.torque(t + h, out))
+        return out
+
+    return _iterate(improve, y)
+
+
+def _midpoint_on_group(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array]) -> Array:
+    """Return the state of the midpoint rule on the rotation group: the momentum of the middle turns the body."""
+    body = _Body(f)
+    L = body.momentum(y)
+
+    def improve(middle: Array) -> Array:
+        turn = h / 2 * middle[4:]
+        out = np.concatenate([_rotate(y[:4], turn), middle[4:]])
+        out[4:] = body.rates(_carry(turn, L) + h / 2 * body.torque(t + h / 2, out))
+        return out
+
+    middle = _iterate(improve, y)
+    turn, push = h * middle[4:], h * body.torque(t + h / 2, middle)
+    return np.concatenate([_rotate(y[:4], turn), body.rates(_carry(turn, L) + _carry(turn / 2, push))])
+
+
+def _moser_veselov(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array]) -> Array:
+    """Return the state of the discrete Moser-Veselov map, with half a push of the torque, and of a rotor, at each end."""
+    body = _Body(f)
+    J, rotor = body.J, _column(body.rotor, y[4:])
+
+    def push(t: Any, y: Array) -> Array:
+        return h / 2 * (body.torque(t, y) + cross(rotor, y[4:]))
+
+    def improve(c: Array) -> Array:
+        return np.linalg.solve(J, (h / 2 * (1 + (c * c).sum(axis=0)) * L - cross(c, body.times(J, c))).reshape(3, -1)).reshape(
+            c.shape
+        )
+
+    L = body.times(J, y[4:]) + push(t, y)
+    c = _iterate(improve, h / 2 * y[4:])
+    L = L - 4 / h * cross(c, body.times(J, c)) / (1 + (c * c).sum(axis=0))
+    q = _rotate(y[:4], _cayley(2 * c))
+
+    def end(new: Array) -> Array:
+        return np.concatenate([q, body.rates(L + rotor + push(t + h, new))])
+
+    return _iterate(end, np.concatenate([q, body.rates(L + rotor)]))
+
+
+def _split_axes(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array], axes: Sequence[int]) -> Array:
+    """Return the state after rotations about principal axes, each by its part of the energy, and half a push at each end."""
+    body, moments, R_BP = _Body(f), f.body.moments, f.body.R_BP
+    L, new = body.momentum(y) + h / 2 * body.torque(t, y), y.copy()
+    for axis, share in zip((*axes, *axes[1::-1]), (0.5, 0.5, 1.0, 0.5, 0.5), strict=True):
+        direction = R_BP[:, axis]
+        turn = share * h / moments[axis] * np.multiply.outer(direction, np.tensordot(direction, L - _column(body.rotor, L), 1))
+        L, new[:4] = _carry(turn, L), _rotate(new[:4], turn)
+    new[4:] = body.rates(L)
+    new[4:] = body.rates(L + h / 2 * body.torque(t + h, new))
+    return new
+
+
+def _column(v: Array, like: Array) -> Array:
+    return v.reshape(3, *(1,) * (like.ndim - 1))
+
+
+def _newmark(f: Slope, t: Any, y: Array, h: float, past: Sequence[Array]) -> Array:
+    """Return the state of Newmark's method on rotation vectors, with beta 1/4 and gamma 1/2."""
+    first = f(t, y)[4:]
+
+    def improve(new: Array) -> Array:
+        last = f(t + h, new)[4:]
+        turn = h * y[4:] + h * h / 4 * (first + last)
+        return np.concatenate([_rotate(y[:4], turn), y[4:] + h / 2 * (first + last)])
+
+    return _iterate(improve, y)
+
+
 TURNED = " with the exponential map of weighted rates"
 BARE = " without normalisation"
 
@@ -230,6 +356,21 @@ STEPS: dict[str, Step] = {
     f"Heun's method{TURNED}": _by_tableau(HEUN, _rates),
     f"RK4{TURNED}": _by_tableau(RUNGE_KUTTA_4, _rates),
     "RK4 on rotation vectors (Munthe-Kaas)": _by_tableau(RUNGE_KUTTA_4, _vector_rates),
+    "the energy-momentum method (Krenk & Nielsen; Simo & Wong with Cayley's map)": Step(
+        2, 0, partial(_mean_momentum, turn_of=_cayley)
+    ),
+    "the energy-momentum method with the exponential map (Simo & Wong)": Step(
+        2, 0, partial(_mean_momentum, turn_of=lambda turn: turn)
+    ),
+    "the midpoint rule on the rotation group": Step(2, 0, _midpoint_on_group),
+    "the discrete Moser-Veselov map": Step(2, 0, _moser_veselov),
+    "Newmark's method on rotation vectors": Step(2, 0, _newmark),
+    **{
+        f"splitting into rotations about the principal axes {a}, {b}, {c}, {b}, {a}": Step(
+            2, 0, partial(_split_axes, axes=(a - 1, b - 1, c - 1))
+        )
+        for a, b, c in permutations((1, 2, 3))
+    },
 }
 
 

@@ -7,6 +7,7 @@ import re
 import shlex
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -25,10 +26,13 @@ MOST_COLUMNS = 10_000
 """Largest number of columns of a file."""
 MOST_GUESSED = 60
 """Largest number of columns among which a rotation is searched, for an example."""
+ROTATION = 1e-3
+"""Largest departure of the square of a norm from the one of a rotation."""
 MOVES = "an attitude relative to a frame that moves"
 PLACES = "angles to the local horizon, which moves; --euler zyx if they turn body to inertial axes"
 SEQUENCE = "their sequence is not known; add --euler with it, such as --euler zyx"
 PART = "a part of an attitude or of rates by its name, without the other parts"
+ROTATES = "a rotation by their numbers, and not by their names"
 NOTHING = "neither a time nor an attitude nor a rate by its name"
 SHORT = {"time": "time", "rates": "w", "quaternion": "q", "matrix": "R", "angles": "euler", "rotation vector": "rotvec"} | {
     "axis and angle": "axis",
@@ -76,7 +80,10 @@ def choose(path: Path, layout: Layout, options: Options, sample: Sample) -> Layo
         raise BadInput("columns", repr(options.columns), f"each column once, and not {twice[0]!r} twice")
     reasons = {name: other(name) or (PART if looks(name) else NOTHING) for name in names} | layout.unused
     layout.unused = {name: reasons[name] for name in names if name not in counts}
-    layout.doubtful = _find_doubtful(layout) if named.keys() <= {"time"} else []
+    if named.keys() <= {"time"}:
+        rest = [name for name, reason in layout.unused.items() if reason == NOTHING]
+        layout.unused |= dict.fromkeys(chain(*_guess(rest, sample).values()), ROTATES)
+        layout.doubtful = _find_doubtful(layout)
     return layout
 
 
@@ -153,7 +160,7 @@ def _find_doubtful(layout: Layout) -> list[str]:
         for name, reason in layout.unused.items()
         if name not in others
         and name not in decided
-        and (reason in (MOVES, PLACES, SEQUENCE) or looks(name) or parts[parse(name).words[:-1]] > 2)
+        and (reason in (MOVES, PLACES, SEQUENCE, ROTATES) or looks(name) or parts[parse(name).words[:-1]] > 2)
     ]
 
 
@@ -217,14 +224,20 @@ def _by_option(path: Path, layout: Layout, text: str) -> dict[str, list[str]]:
     return chosen
 
 
-def name_columns(chosen: Mapping[str, Sequence[str]], names: Sequence[str]) -> str:
-    """Return the option `--columns` that names columns, by their numbers where names cannot be written there."""
+def name_columns(chosen: Mapping[str, Sequence[str]], names: Sequence[str], counted: bool = False) -> str:
+    """Return the option `--columns` that names columns, by their numbers where names cannot be written there.
+
+    The time is divided by 200 if it is `counted`.
+    """
 
     def short(name: str) -> str:
         plain = re.fullmatch(r"[\w./\[\]-]+", name) and not name.isdigit() and name.isascii()
         return name if plain else str(names.index(name) + 1)
 
-    parts = [f"{SHORT[kind]}={':'.join(map(short, members))}" for kind, members in chosen.items()]
+    parts = [
+        f"{SHORT[kind]}={':'.join(map(short, members))}{'/200' * (counted and kind == 'time')}"
+        for kind, members in chosen.items()
+    ]
     euler = " --euler zyx" * ("angles" in chosen and parse(chosen["angles"][0]).label in _AXES)
     return f"--columns {shlex.quote(','.join(parts))}{euler}"
 
@@ -253,17 +266,21 @@ def _understood(
 
 def _guess(names: Sequence[str], sample: Sample) -> dict[str, list[str]]:
     """Return neighbouring columns whose numbers are a rotation: matrices, or quaternions of norm 1; {} without any."""
-    numbers = dict[str, Array]()
-    for name in names[:MOST_GUESSED]:
-        with contextlib.suppress(BadInput):
-            numbers[name] = sample([name])[:, 0]
-    for kind, size in (("matrix", 9), ("quaternion", 4)):
+    numbers, some = dict[str, Array](), names[:MOST_GUESSED]
+    try:
+        numbers = dict(zip(some, sample(some).T, strict=True)) if some else {}
+    except BadInput:  # one of them has text
+        for name in some:
+            with contextlib.suppress(BadInput):
+                numbers[name] = sample([name])[:, 0]
+    for kind, size, norm in (("matrix", 9, 3), ("quaternion", 4, 1)):
         for start in range(len(numbers) - size + 1):
             members = [*numbers][start : start + size]
             x = np.column_stack([numbers[name] for name in members])
+            x = x[np.isfinite(x).all(axis=1)]
             with np.errstate(all="ignore"):
-                off = np.abs((x**2).sum(axis=1) - size // 3) if kind == "matrix" else np.abs((x**2).sum(axis=1) - 1)
-            if len(x) and (off < 1e-3).all() and (np.ptp(x, axis=0) > 1e-6).sum() > 1:
+                off = np.abs((x**2).sum(axis=1) - norm)
+            if len(x) > 1 and (off < ROTATION).all() and (np.ptp(x, axis=0) > ROTATION).sum() > 1:
                 return {kind: members}
     return {}
 
@@ -279,7 +296,7 @@ def _hint(
         return f"the columns by number, such as {text}{' --units rad' * ('w=' in text)}"
     taken = {*_flat(chosen.values()), *layout.unused}
     free = [name for name in names if name not in taken]
-    likely = next((name for name in free if re.search("time|date|stamp|tick|clock", name.lower())), None)
+    likely = next((name for name in free if re.search("time|date|stamp|clock", name.lower())), None)
     counter = next((name for name in free if is_counter(name)), None) if likely is None else None
     time = [*times[0]] if times else [some for some in (likely, counter, *free) if some is not None][:1]
     if not time:
@@ -299,10 +316,10 @@ def _hint(
         if len(chosen["rates"]) < 3:
             return "columns of attitudes or rates; --columns time=NAME,w=X:Y:Z names them"
     chosen = {"time": time} | {kind: members for kind, members in chosen.items() if kind in SHORT and kind != "time"}
-    text = name_columns(chosen, names)
     if not times and counter is not None:
-        number = name_columns({"time": time}, names).removeprefix("--columns ")
-        text = text.replace(number, f"{number}/200", 1)
-        return f"a column of times. If column {counter!r} counts rows, 200 a second: {text}"
+        return (
+            f"a column of times. If column {counter!r} counts rows, 200 a second: {name_columns(chosen, names, counted=True)}"
+        )
+    text = name_columns(chosen, names)
     units = {parse(name).unit for name in chosen.get("rates", ())}
     return f"the columns by name or number, such as {text}{' --units rad' * (None in units)}"

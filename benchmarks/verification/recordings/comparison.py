@@ -25,6 +25,7 @@ from ..compare import (
     UNITS_OF_DIGITS,
     Allowed,
     Compared,
+    Effort,
     allow,
     estimate_noise,
     exact,
@@ -37,6 +38,8 @@ from .units import no_unit
 
 ROUND_OFF = 2e-15
 """Error of an exact motion, rad."""
+EFFORT = 20_000
+"""Work of the fits of the start, before a mistake is searched for: about 5 s of an idle core."""
 ROWS_OF_NOISE = 4000
 """Largest number of rows from which noise is estimated."""
 CLEARLY = 2.0
@@ -109,8 +112,9 @@ def prepare(scene: Scene, recording: Recording, from_row: bool, error: float | N
         rounded=tuple(allowed.rounded.tolist()),
         flipped=recording.flipped,
         open=(bool(unknown[0]), bool(unknown[1])),
+        effort=Effort(EFFORT),
     )
-    if any(case.open) and (case.error.max(axis=1) > case.allowed).any() and case.turned <= NUMERICAL:
+    if any(case.open) and (case.error.max(axis=1) > case.allowed).any() and case.turned <= NUMERICAL / 10:
         # The rows alone do not show their noise. The exact motion may leave nothing else.
         _, _, made = case.fit(exact(case), np.zeros(0), np.zeros(0))
         white = case.leaves_noise(*made)

@@ -51,8 +51,9 @@ class Layout:
 
     `unused` has a reason for every other column, and `doubtful` the columns among them that look like attitudes or rates.
     `also` has other sets of columns, each with its kind, which should be the same motion. `decided` are columns that the data
-    left out. `steps` are units of times that an option names, `open` are quantities whose unit only the motion of the scene
-    shows. `origin` is subtracted from times in two columns, seconds and their fractions.
+    left out. `steps` are units of times that an option names. `open` are quantities whose unit only the motion of the scene
+    shows. `order` is the order of quaternions that rates show. `origin` is subtracted from times in two columns, seconds and
+    their fractions.
     """
 
     names: list[str]
@@ -63,6 +64,7 @@ class Layout:
     decided: list[str] = field(default_factory=list)
     steps: dict[str, float] = field(default_factory=dict)
     open: list[str] = field(default_factory=list)
+    order: str | None = None
     notes: list[str] = field(default_factory=list)
     origin: float = 0.0
 
@@ -86,7 +88,7 @@ class Layout:
         first = next((parse(name) for name in self.used.get("quaternion", ())), None)
         if first is None:
             return False
-        return first.label not in (*LETTERS, *"ijkr", "real") and not {"qpos", *ORDERS}.intersection(first.words)
+        return first.label not in (*LETTERS, *"ijkrs", "real", "scalar") and not {"qpos", *ORDERS}.intersection(first.words)
 
     @property
     def columns(self) -> list[str]:

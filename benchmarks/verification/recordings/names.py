@@ -55,15 +55,16 @@ ANGLES = ("roll", "pitch", "yaw")
 GREEK = ("phi", "theta", "psi")
 _PAIRS = frozenset(a + b for a in "xyz" for b in "xyz")
 _PLAIN = LETTERS | _PAIRS | frozenset("ijk")
-LABELS = LETTERS | _PAIRS | frozenset((*"ijkrpq", "real", "angle", *ANGLES, *GREEK))
+LABELS = LETTERS | _PAIRS | frozenset((*"ijkrpqs", "real", "scalar", "angle", *ANGLES, *GREEK))
 """Words that name a part of a quantity. Numbers do, too."""
 SYNONYMS: dict[str, tuple[str, ...]] = {
-    **dict.fromkeys(("heading", "gier", "gieren", "gierwinkel", "lacet", "cap"), ("yaw",)),
-    **dict.fromkeys(("bank", "rollen", "rollwinkel", "wank", "roulis"), ("roll",)),
-    **dict.fromkeys(("nick", "nicken", "nickwinkel", "tangage"), ("pitch",)),
+    **dict.fromkeys(("heading", "hdg", "kurs", "gier", "gieren", "gierwinkel", "lacet", "cap"), ("yaw",)),
+    **dict.fromkeys(("bank", "rll", "rollen", "rollwinkel", "wank", "roulis"), ("roll",)),
+    **dict.fromkeys(("pch", "ptch", "nick", "nicken", "nickwinkel", "tangage"), ("pitch",)),
     **dict.fromkeys(("gyr", "gyroscope", "gyroskop", "giroscopio", "giroscope"), ("gyro",)),
     **dict.fromkeys(("quat", "quaternions", "quaternionen"), ("quaternion",)),
     **dict.fromkeys(("att", "lage", "assiette"), ("attitude",)),
+    **dict.fromkeys(("ori", "orient"), ("orientation",)),
     **dict.fromkeys(("vel", "velocities", "geschwindigkeit", "vitesse", "velocidad"), ("velocity",)),
     **dict.fromkeys(("ang", "rotational", "angulaire", "angular"), ("angular",)),
     **dict.fromkeys(("drehrate", "drehgeschwindigkeit", "winkelgeschwindigkeit", "angvel", "angrate"), ("angular", "velocity")),
@@ -86,6 +87,7 @@ _COMPOUND = _VOCABULARY | SYNONYMS.keys()
 _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[0-9]+|[./:]|[^\W\d_]+")
 _FRAMES = re.compile("([qwrc])(wb|bw|bn|nb|ib|bi|bl|lb|br|rs|b)")
 _ENDS = frozenset(("deg_s", "rad_s", "deg_sec", "rad_sec", "dps", "rpm", "degrees", "deg", "radians", "rad"))
+_SCALARS = ["q", "s"], ["quaternion", "s"]
 _LAST = _ENDS | {"seconds", "secs", "sec", "s", "msec", "usec", "nsec", "ms", "us", "ns"}
 
 
@@ -104,7 +106,8 @@ class Name:
     @property
     def label(self) -> str:
         """The last word that names a part of a quantity, such as x or 3; "" without one."""
-        return next((word for word in reversed(self.words) if word in LABELS or word.isdigit()), "")
+        labels = [word for word in self.words if word in LABELS or word.isdigit()]
+        return next((word for word in reversed(labels) if word != "angle"), labels[-1] if labels else "")
 
 
 @lru_cache(maxsize=20_000)
@@ -150,7 +153,7 @@ def _is_unit(text: str) -> bool:
 def _cut_unit(words: list[str]) -> tuple[list[str], str | None]:
     """Return words without those of a unit at the end, or before the last word if that names a part, and the unit."""
     for size in (2, 1):
-        if len(words) > size and (unit := "_".join(words[-size:])) in _LAST:
+        if len(words) > size and (unit := "_".join(words[-size:])) in _LAST and words[-2:] not in _SCALARS:
             return words[:-size], unit
         if len(words) > size + 1 and words[-1] in LABELS and (unit := "_".join(words[-size - 1 : -1])) in _ENDS:
             return [*words[: -size - 1], words[-1]], unit
@@ -164,7 +167,7 @@ def _split(token: str) -> tuple[str, ...]:
         return SYNONYMS[token]
     if token in _VOCABULARY or token in LABELS or token in _LAST or len(token) < 2:
         return (token,)
-    if len(token) == 2 and (token[1] in LETTERS or (token[0] == "q" and token[1] in "rijk")):
+    if len(token) == 2 and (token[1] in LETTERS or (token[0] == "q" and token[1] in "rijks")):
         return tuple(token)
     if match := _FRAMES.fullmatch(token):
         return match[1], match[2]

@@ -43,7 +43,12 @@ QUANTITIES = (
         "quaternion",
         _all("quaternion", "orientation", "rotation", "attitude"),
         vocabulary("q rot"),
-        (tuple("wxyz"), ("real", "i", "j", "k"), tuple("rijk"), tuple("0123"), tuple("1234")),
+        (
+            tuple("wxyz"),
+            *((first, *rest) for first in ("r", "real", "s", "scalar") for rest in ("ijk", "xyz")),
+            tuple("0123"),
+            tuple("1234"),
+        ),
     ),
     Quantity("quaternion", (), frozenset("e"), (tuple("0123"),)),
     Quantity("matrix", _all("dcm", "matrix"), vocabulary("r m c rotation"), (*_MATRIX, *_FLAT)),

@@ -17,7 +17,7 @@ from conservative.attitude import Array
 from conservative.errors import BadInput
 
 from .attitudes import convert
-from .layout import Layout, Options
+from .layout import ORDERS, Layout, Options
 from .names import UNITS, parse
 from .times import DATES, DAYS, FRACTIONS
 
@@ -92,11 +92,19 @@ def find_units(values: Array, layout: Layout, options: Options) -> None:
         expected = ranked[0][1]
     layout.open = [kind for kind, size in zip(open_, expected[1:], strict=True) if size is None]
     set_sizes(layout, ("time", *open_), [1.0 if size is None else size for size in expected])
+    if layout.numbered and options.quaternion is None and parts["rates"] and len(values) > 2:
+        some = values[:400] * layout.sizes
+        ordered = sorted((_disagreement(some, layout, replace(options, quaternion=order)), order) for order in ORDERS)
+        if ordered[0][0] < AGREES and ordered[1][0] > DISAGREES:
+            layout.order = ordered[0][1]
+            names = ", ".join(layout.used["quaternion"])
+            layout.notes.append(f"{names}: read as {layout.order}, because only so do attitudes and rates agree.")
 
 
 def open_readings(layout: Layout, options: Options) -> list[tuple[Layout, Options]]:
     """Return the layouts and options in which a file may be read, if only the motion of the scene shows units or orders."""
-    orders = ("wxyz", "xyzw") if layout.numbered and options.quaternion is None else (options.quaternion,)
+    order = options.quaternion or layout.order
+    orders = ORDERS if layout.numbered and order is None else (order,)
     out = []
     for sizes in product(ANGULAR, repeat=len(layout.open)):
         reading = replace(layout, used=dict(layout.used))
@@ -123,7 +131,7 @@ def rank_units(values: Array, layout: Layout, options: Options) -> list[tuple[fl
     ranked: list[tuple[float, Any]] = []
     for sizes in product(*choices) if layout.attitude and parts["rates"] and len(some) > 2 else ():
         set_sizes(layout, ("time", *open_), sizes)
-        orders = (options.quaternion,) if options.quaternion or not layout.numbered else ("wxyz", "xyzw")
+        orders = (options.quaternion,) if options.quaternion or not layout.numbered else ORDERS
         off = [_disagreement(some * layout.sizes, layout, replace(options, quaternion=order)) for order in orders]
         ranked.append((min(off), sizes))
     layout.used = parts

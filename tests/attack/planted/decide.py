@@ -24,8 +24,10 @@ from .worlds import Draw, World, is_table, scaled
 FLOOR, WRONG, IDENTIFIABLE = 1e-9, 3.0, 10.0
 NEAR = 0.2
 """Largest difference, rad or relative, with which fits begin."""
-FEWEST = 12
-"""Smallest number of rows of a fit."""
+FEWEST, ENOUGH = 12, 8
+"""Smallest number of rows of a fit, and of rows that determine a mistake."""
+ENOUGH_FOR_NOISE = 30
+"""Smallest number of rows that show how large their noise is."""
 CLOSE = 300.0
 """Difference, in grains, above which another mistake is not taken for a long step, or for times that scatter."""
 SMALL, MOST = 1e-6, 8
@@ -163,7 +165,9 @@ def rows_of(made: Any, t: Any, Y: Any) -> Rows:
 def decide(made: Any, t: Any, Y: Any) -> None:
     """Decide whether a file is right, whether its mistake is identifiable, and which others make the same rows."""
     made.expected = "right" if made.kind == "right" else "wrong"
-    if made.kind == "right" or len(t) < 2:
+    if made.noise.startswith("1e") and len(t) < ENOUGH_FOR_NOISE:
+        made.expected, made.reason = "", "too few rows to know their noise"
+    if made.kind == "right" or made.reason:
         return
     if made.mistake == "time in ms":
         made.identifiable, made.size = made.about["turns"] > 0.5, np.inf
@@ -188,10 +192,12 @@ def decide(made: Any, t: Any, Y: Any) -> None:
         if name != made.mistake and left < IDENTIFIABLE:
             made.same.add(name)
             blocking += [name] * (numbers <= mine)
-    made.identifiable = not blocking and made.size >= IDENTIFIABLE
     made.reason = f"the same rows: {blocking[0]}" if blocking else ""
     if made.size < IDENTIFIABLE:
         made.reason = "noise or digits nearly hide it"
+    elif len(t) < ENOUGH:
+        made.reason = f"fewer than {ENOUGH} rows"
+    made.identifiable = not made.reason
 
 
 def rivals(made: Any, rows: Rows) -> Iterator[tuple[str, int, float]]:
@@ -217,6 +223,7 @@ def explanations(rows: Rows) -> Iterator[tuple[str, int, Build]]:
     elapsed = t - at
     shifted: dict[str, tuple[int, Any]] = {
         "time shift": (1, lambda p: np.where(elapsed > 0, elapsed + p[0] / rows.scale, 0.0)),
+        "time scale": (1, lambda p: elapsed * (1 + p[0])),
         "phase drift": (2, lambda p: elapsed * (1 + p[1]) + p[0] / rows.scale),
     }
     for name, (numbers, times) in shifted.items():

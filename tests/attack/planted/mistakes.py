@@ -283,7 +283,7 @@ def axes_of_body(q: Any, w: Any, c: Any) -> tuple[Any, Any]:
     return motion.times(q, np.broadcast_to(c, q.shape)), motion.spin(np.broadcast_to(motion.back(c), q.shape), w)
 
 
-TIMES = ("time shift", "phase drift", "time in ms", "jittered times", "dropped rows", "rates at other times")
+TIMES = ("time shift", "time scale", "time in ms", "jittered times", "dropped rows", "rates at other times")
 HABITS = ("rate limit", "rate limit per component", "dead band", "sleep", "halt", "frozen motion")
 SAMPLES = {
     "held samples": ("held", "held"),
@@ -299,13 +299,13 @@ ROWS = (*SAMPLES, "held rows", "single rows", "first row", "transposed in some r
 PAIR = "two mistakes"
 NUMBERS = {
     **dict.fromkeys([name for name in SCENES if name.startswith("size of")], 1),
-    **dict.fromkeys(("rate of the orbit", "damping", "speed of attitudes", "size of the rates", "time shift"), 1),
+    **dict.fromkeys(("rate of the orbit", "damping", "speed of attitudes", "size of the rates", "time shift", "time scale"), 1),
     **dict.fromkeys((*STEPS, *ATTITUDES), 1),
     **dict.fromkeys(("bias of the rates", "rates in turned axes", "rates in mirrored axes", "body axes"), 3),
     **dict.fromkeys(("drift in body axes", "drift in world axes", "drift of a bias"), 3),
     **dict.fromkeys(("rates at other times", "rate limit", "rate limit per component", "dead band", "sleep", "halt"), 1),
     **dict.fromkeys((*SAMPLES, "held rows", "transposed in some rows"), 2),
-    "phase drift": 2, "other moments": 3, "another body": 6, "jittered times": 99, "dropped rows": 4, "single rows": 3,
+    "other moments": 3, "another body": 6, "jittered times": 99, "dropped rows": 4, "single rows": 3,
     "heading drift": 1,
 }  # fmt: skip
 """Fitted numbers of a mistake, beside the initial state; 0 if it is not here."""
@@ -322,7 +322,7 @@ def shift_times(draw: Draw, name: str, world: World, t: Any, gap: float) -> Any:
         return np.hstack([both[np.searchsorted(order, t), :4], both[np.searchsorted(order, at), 4:]])
     at = {
         "time shift": lambda: np.append(0.0, t[1:] + gap * draw.between(0.05, 3)),
-        "phase drift": lambda: t * (1 + draw.sign() * draw.between(1e-4, 0.03)),
+        "time scale": lambda: t * (1 + draw.sign() * draw.between(1e-4, 0.03)),
         "jittered times": lambda: np.append(
             0.0, t[1:] + gap * draw.between(0.02, 0.2) * np.clip(draw.random.normal(size=n - 1), -2, 2)
         ),

@@ -38,7 +38,8 @@ ALIASES: dict[str, tuple[str, ...]] = {
     "interpolated quaternions and interpolated rates": ("interpolated matrices and interpolated rates",),
     "dropped rows": ("jittered times",),
     "time shift": ("phase drift",),
-    "time in ms": ("phase drift",),
+    "time scale": ("phase drift",),
+    "time in ms": ("phase drift", "time scale"),
     "other moments": ("another body",),
     "another body": ("other moments",),
     "rate limit per component": ("rate limit",),
@@ -179,12 +180,19 @@ def run(path: Path, seeds: Iterable[int], tell: Any = print) -> Iterator[dict[st
             yield row
 
 
+FACTS = {
+    "parts": "steps a row", "gaps": "rows missing", "nan": "rows of nan", "duplicated": "rows twice", "cut": "rows cut off",
+}  # fmt: skip
+"""Facts of a row that a complaint shows."""
+
+
 def line_of(row: dict[str, Any]) -> str:
     """Return a complaint as a line: seed, scene, mistake, expected, answer, seconds."""
     expected = row["expected"] or "either"
     names = " or ".join(" + ".join(keys) for keys in row["named"])
     answer = f"{row['verdict']}: {names or 'no name'}"
     facts = f"{row['layout']}, {row['noise']}, {row['turns']} turns, {row['rows']} rows"
+    facts += "".join(f", {row[name]} {what}" for name, what in FACTS.items() if row.get(name))
     same = f" (or {', '.join(row['same'])})" if row["same"] else ""
     return (
         f"{row['seed']} | {row['complaint']} | {row['scene']}; {facts} | {row['mistake']}{same}, {row['size']:.3g} grains | "

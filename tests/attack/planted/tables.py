@@ -136,6 +136,23 @@ def read_page(text: str) -> tuple[str, dict[str, tuple[int, int]]]:
     return found[1] if found else "", {name: (int(count), int(of)) for name, count, of in lines}
 
 
+SEVERE = (
+    "right files called wrong", "wrong files called right", "false names, of the answers with a name", "no answer, or a crash",
+)  # fmt: skip
+"""Rates that may not be larger than on the page, not even within their intervals."""
+
+
+def compare(now: dict[str, tuple[int, int]], page: dict[str, tuple[int, int]]) -> list[str]:
+    """Return the rates that are worse than on the page: severe ones that are larger, others outside of their intervals."""
+    worse = []
+    for name, (count, of) in now.items():
+        low, high = interval(*page.get(name, (0, 0)))
+        share, before = count / max(of, 1), page.get(name, (0, 0))
+        if (name in SEVERE and share > before[0] / max(before[1], 1)) or not low <= share <= high:
+            worse.append(f"{name}: {count} of {of}; {before[0]} of {before[1]} on the page")
+    return worse
+
+
 def write_page(page: Path, rows: list[Row]) -> None:
     """Put the tables into a page."""
     before, _, rest = page.read_text(encoding="utf-8").partition(BEGIN)

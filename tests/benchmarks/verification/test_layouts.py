@@ -73,6 +73,8 @@ READ = {
     "upper case": {"TIME": T} | block("Q*", "WXYZ", WXYZ) | block("W* [RAD/S]", "XYZ", W),
     "ijk and real": TIME | block("quat_*", ("i", "j", "k", "real"), XYZW) | RATE,
     "qr qi qj qk": TIME | block("q*", "rijk", WXYZ) | RATE,
+    "scalar s": TIME | block("q_*", "sxyz", WXYZ) | RATE,
+    "a scalar": TIME | block("quaternion *", ("x", "y", "z", "scalar"), XYZW) | RATE,
     "Euler parameters": TIME | block("e*", NUMBERS, WXYZ) | RATE,
     "camel case": {"timeStamp": T} | block("orientationQuat*", "WXYZ", WXYZ) | block("angularVelocity*", "XYZ", W),
     "blanks in names": {"Time [s]": T} | block("Quaternion *", "wxyz", WXYZ) | block("Angular Velocity * [deg/s]", "XYZ", DEG),
@@ -147,6 +149,9 @@ READ = {
     "a unit tells": {"t (s)": T} | block("g* (deg/s)", "xyz", DEG) | block("a* (m/s^2)", "xyz", NOISE),
     # angles
     "NASA axes": TIME | dict(zip(("heading (deg)", "pitch (deg)", "bank (deg)"), YPR.T, strict=True)) | RATE,
+    "short names": TIME | dict(zip(("HDG", "PCH", "RLL"), YPR.T, strict=True)) | RATE,
+    "angles by name": TIME | dict(zip(("Yaw angle (deg)", "Pitch angle (deg)", "Roll angle (deg)"), YPR.T, strict=True)) | RATE,
+    "ori": TIME | block("ori_*", "wxyz", WXYZ) | RATE,
     "roll first": TIME | block("* (deg)", RPY, YPR[:, ::-1]) | block("*_rate (deg/s)", RPY, DEG),
     "estimated angles": TIME | block("est_*_deg", RPY, YPR[:, ::-1]) | RATE,
     "an aircraft": {"t": T}
@@ -188,6 +193,39 @@ READ = {
     "wheels": TIME | block("wheel_omega_*", "123", NOISE) | block("rw_speed*", "123", NOISE) | QUAT | RATE,
     "accelerations": TIME | block("angular_acceleration_*", "xyz", NOISE) | block("omega_dot_*", "xyz", NOISE) | RATE,
     "Simulink": {"time": T} | block("omega_b(*) (rad/s)", "123", W) | block("q_b2i(*)", "1234", WXYZ),
+    "axis and angle": {"t": T}
+    | block("axis_*", "xyz", VECTOR / np.linalg.norm(VECTOR, axis=1)[:, None])
+    | {"angle": np.linalg.norm(VECTOR, axis=1)},
+    "revolutions": {"t": T} | block("w_* (rpm)", "xyz", W * 30 / np.pi),
+    "sigma": {"t": T} | block("sigma_*", "123", MRP) | block("omega_*", "123", W),
+    "rx ry rz": {"t": T} | block("r*", "xyz", VECTOR) | RATE,
+    "Android": {"timestamp": np.round(1e9 * EPOCH)}
+    | block("ROTATION VECTOR *", "XYZ", VECTOR)
+    | block("GYROSCOPE * (rad/s)", "XYZ", W)
+    | block("ACCELEROMETER * (m/s²)", "XYZ", NOISE)
+    | block("ORIENTATION * (°)", "XYZ", YPR)
+    | {"Time since start in ms": 1e3 * T},
+    "MAVLink sensors": {"time_usec": np.round(1e6 * T)}
+    | dict(zip(("xgyro", "ygyro", "zgyro"), W.T, strict=True))
+    | dict(zip(("xacc", "yacc", "zacc"), NOISE.T, strict=True)),
+    "Betaflight": {"loopIteration": np.arange(len(T)) * 1.0, "time (us)": np.round(1e6 * T)}
+    | block("axisP[*]", "012", NOISE)
+    | block("axisI[*]", "012", NOISE)
+    | block("rcCommand[*]", NUMBERS, np.ones((len(T), 4)))
+    | block("setpoint[*]", NUMBERS, np.ones((len(T), 4)))
+    | block("gyroADC[*] (deg/s)", "012", DEG)
+    | block("accSmooth[*]", "012", NOISE)
+    | block("motor[*]", NUMBERS, np.ones((len(T), 4))),
+    "Unreal": {"TimeSeconds": T}
+    | block("*", ("Roll", "Pitch", "Yaw"), YPR[:, ::-1])
+    | block("AngularVelocityDeg*", "XYZ", DEG),
+    "Julian days": {"Sat.UTCModJulian": 21545 + T / 86_400, "Sat.ElapsedSecs": T} | block("Sat.Q*", "1234", XYZW),
+    "a state with derivatives": {"t": T}
+    | block("qdot_*", NUMBERS, np.ones((len(T), 4)))
+    | block("q_*", NUMBERS, WXYZ)
+    | block("L_*", "xyz", NOISE)
+    | RATE,
+    "channels": {"t": T} | block("c*", [str(i + 1) for i in range(9)], np.ones((len(T), 9))) | RATE,
     # several sets
     "two IMUs that agree": TIME | block("gyro_1_* (rad/s)", "xyz", W) | block("gyro_2_* (rad/s)", "xyz", W),
     "two attitudes that agree": TIME | QUAT | block("quat2_*", "wxyz", -WXYZ) | RATE,
@@ -207,8 +245,9 @@ ASKED = {
     "PX4 rates": {"timestamp": T + 2e-4, "timestamp_sample": T}
     | block("xyz[*]", "012", W)
     | block("xyz_derivative[*]", "012", NOISE),
-    "frames only": {"frame": np.arange(len(T)) * 1.0} | RATE,
-    "an index only": {"": np.arange(len(T)) * 1.0} | RATE,
+    "frames only": {"frame": 200 * T} | RATE,
+    "ticks only": {"tick": 200 * T} | RATE,
+    "an index only": {" ": np.arange(len(T)) * 1.0} | RATE,
     "two times": {"time_a (s)": T, "time_b (s)": LATE} | RATE,
     "two IMUs": TIME | block("gyro_1_* (rad/s)", "xyz", W) | block("gyro_2_* (rad/s)", "xyz", W + 0.01 * NOISE),
     "raw and filtered": TIME | block("gyro_* (rad/s)", "xyz", W) | block("gyro_filtered_* (rad/s)", "xyz", W + 0.01 * NOISE),
@@ -216,6 +255,12 @@ ASKED = {
     "names of letters": {"stamp_ms": 1e3 * T} | block("a*", "xyz", NOISE) | block("g*", "xyz", W),
     "names in another script": {"время": T} | block("скорость *", ("х", "у", "ц"), W),
     "the same names twice": TIME | block("w_* (rad/s)", "xyz", W) | block("w_* (rad/s) ", "xyz", W + 0.1),
+    "only world rates": TIME | QUAT | block("omega_world_* (rad/s)", "xyz", WORLD),
+    "only references": TIME | block("q_ref_*", "wxyz", WXYZ),
+    "Vicon": {"Frame": 200 * T, "Sub Frame": ZERO} | block("Box:R* (rad)", "XYZ", VECTOR) | block("Box:T* (mm)", "XYZ", NOISE),
+    "a state": {"t": T} | block("x[*]", "0123456", np.hstack([WXYZ, NOISE])),
+    "42 without a header": {"": T} | block(" *", "123", W),
+    "many sensors": TIME | {f"gyro_{i}_{axis} (rad/s)": W[:, j] + i * T for i in range(1000) for j, axis in enumerate("xyz")},
     "Euler angles without a sequence": TIME | block("euler_* (deg)", "zyx", YPR),
 }
 """Layouts that are a question: the message names an option with which they are read."""
@@ -310,6 +355,16 @@ TEXTS = {
         "csv",
         f"time,frame_id,{WORDS_W}\n" + "".join(f"{t:.17g},base link,{r}\n" for t, r in zip(T, rows(W).split(), strict=True)),
     ),
+    "TUM": ("txt", "# timestamp tx ty tz qx qy qz qw\n" + rows(T, NOISE, XYZW, separator=" ")),
+    "dates in words": (
+        "csv",
+        "Time (UTCG),q1,q2,q3,q4\n"
+        + "".join(f"29 Nov 2026 12:00:0{t:.9f},{r}\n" for t, r in zip(T, rows(XYZW).split(), strict=True)),
+    ),
+    "times of a day": (
+        "csv",
+        f"time,{WORDS_W}\n" + "".join(f"12:00:0{t:.9f},{r}\n" for t, r in zip(T, rows(W).split(), strict=True)),
+    ),
     "texts of a comment": ("csv", f"% motion of a box\n% time,{WORDS_W}\n" + rows(T, W)),
 }
 """Texts that are read without options: the ending of the file and its content."""
@@ -320,7 +375,8 @@ def write(folder, columns, separator=",", name="log.csv", comma=False):
     text = [separator.join(f"{x:.17g}" for x in row) for row in np.column_stack(list(columns.values()))]
     text = [line.replace(".", ",") for line in text] if comma else text
     header = separator.join(name.strip() for name in columns)
-    (folder / name).write_text("\n".join([header, *text]) + "\n")
+    header = [] if not next(iter(columns)) else [header]
+    (folder / name).write_text("\n".join([*header, *text]) + "\n")
     return folder / name
 
 
@@ -342,8 +398,12 @@ def compare(recording, attitudes=True, rates=True):
 
 def has(columns):
     """Whether columns of a layout are attitudes and rates, by their values."""
-    turns = [*WXYZ.T, *VECTOR.T, *MRP.T, *MATRIX.T, *YPR.T, *np.radians(YPR).T, *ZXZ.T, *np.degrees(ZXZ).T]
-    return [any(np.array_equal(x, y) for x in columns.values() for y in parts) for parts in (turns, [*W.T, *DEG.T])]
+    angle = np.linalg.norm(VECTOR, axis=1)
+    turns = [angle, *WXYZ.T, *VECTOR.T, *MRP.T, *MATRIX.T, *YPR.T, *np.radians(YPR).T, *ZXZ.T, *np.degrees(ZXZ).T]
+    return [
+        any(np.array_equal(x, y) for x in columns.values() for y in parts)
+        for parts in (turns, [*W.T, *DEG.T, *(W * 30 / np.pi).T])
+    ]
 
 
 @pytest.mark.parametrize("name", READ)
@@ -413,4 +473,53 @@ def test_a_layout_that_is_not_clear_is_a_question_whose_answer_works(name, tmp_p
         settled(path)
     options = answer(error.value)
     assert options
-    compare(settled(path, **options), *has(ASKED[name]))
+    attitudes, rates = has(ASKED[name])
+    options |= {"world": True} if name == "only world rates" else {}
+    compare(settled(path, **options), attitudes, rates or "world" in options)
+
+
+BESIDE = {
+    "world rates": (QUAT | RATE, block("omega_world_* (rad/s)", "xyz", WORLD)),
+    "the same rates": (QUAT | RATE, block("gyro_* (deg/s)", "xyz", DEG)),
+    "the same rates, without attitudes": (RATE, block("gyro_* (deg/s)", "xyz", DEG)),
+    "the same attitude": (QUAT | RATE, block("quat2_*", "wxyz", -WXYZ)),
+}
+
+
+@pytest.mark.parametrize("late", [0.0, 0.02])
+@pytest.mark.parametrize("name", BESIDE)
+def test_a_second_set_is_compared_with_the_first_one_to_the_end(late, name, tmp_path):
+    """Numbers that differ behind the first 400 rows, by which the set is found to be the same, forbid "right"."""
+    motion, other = BESIDE[name]
+    more = np.arange(1000) % len(T)  # a motion that begins again: only columns are compared with each other here
+    times = 0.005 * np.arange(1000)
+    spoiled = {key: x[more] + late * (np.arange(1000) > 600) for key, x in other.items()}
+    path = write(tmp_path, {"time": times} | {key: x[more] for key, x in motion.items()} | spoiled)
+    recording = read(path, Options())
+    assert bool(recording.doubt(None)) == bool(late)
+    assert not late or all(key in recording.doubt(None) for key in other)
+    assert set(other) <= set(recording.layout.unused)
+
+
+REASONS = {
+    "T": ("another time", {"timestamp": T, "T": T}),
+    "T in K": ("not by its numbers", {"timestamp": T, "T": 20 + ZERO}),
+    "T in C": ("its steps differ", {"timestamp": T, "T": 20 + T**2}),
+    "gyro_temp": ("a temperature", {"t": T, "gyro_temp": T}),
+    "q_cmd_w": ("a command", {"t": T} | block("q_cmd_*", "wxyz", WXYZ)),
+    "omega_dot_x": ("a derivative", {"t": T} | block("omega_dot_*", "xyz", W)),
+    "w_cov_x": ("a deviation", {"t": T} | block("w_cov_*", "xyz", W)),
+    "b_w_RS_S_x [rad s^-1]": ("a bias", {"t": T} | block("b_w_RS_S_* [rad s^-1]", "xyz", W)),
+    "pitch (deg)": ("without the other parts", {"t": T, "pitch (deg)": T}),
+    "q_lvlh_x": ("a frame that moves", {"t": T} | block("q_lvlh_*", "wxyz", WXYZ)),
+    "altitude": ("a position", {"t": T, "altitude": T}),
+}
+
+
+@pytest.mark.parametrize("name", REASONS)
+def test_the_reason_of_a_column_that_is_not_used_is_true(name, tmp_path):
+    expected, columns = REASONS[name]
+    layout = read(write(tmp_path, columns | RATE), Options()).layout
+    reason = next(reason for column, reason in layout.unused.items() if column.startswith(name.split(" in ")[0]))
+    assert expected in reason
+    assert list(layout.used["rates"]) == list(RATE)

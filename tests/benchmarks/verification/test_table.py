@@ -98,62 +98,6 @@ def test_the_columns_of_nesc(tmp_path):
     assert "horizon" in recording.layout.unused["eulerAngle_deg_Yaw"]
 
 
-TIMES = 0.5 * np.arange(len(T)) / len(T)  # turns of at most 1 rad, so that Euler angles and Rodrigues parameters exist
-NEAR, RATE = exact(FREE, TIMES)
-TURN = Rotation.from_matrix(NEAR)
-QUATERNION, VECTOR, MRP = TURN.as_quat(), TURN.as_rotvec(), TURN.as_mrp()
-ANGLE = np.linalg.norm(VECTOR, axis=1)
-LOGS = {
-    "PX4: microseconds and an order that the rates decide": (
-        ["timestamp", "rollspeed", "pitchspeed", "yawspeed", "q[0]", "q[1]", "q[2]", "q[3]"],
-        [np.round(1e6 * TIMES), RATE, np.roll(QUATERNION, 1, axis=1)],
-    ),
-    "GMAT: names behind a point": (
-        ["Sat.ElapsedSecs", *(f"Sat.Q{i}" for i in (1, 2, 3, 4)), *(f"Sat.AngularVelocity{axis}" for axis in "XYZ")],
-        [TIMES, QUATERNION, np.degrees(RATE)],
-    ),
-    "Basilisk": (
-        ["times [ns]", *(f"sigma_BN[{i}]" for i in range(3)), *(f"omega_BN_B[{i}]" for i in range(3))],
-        [1e9 * TIMES, MRP, RATE],
-    ),
-    "JSBSim: units behind a hyphen": (
-        ["Time", *(f"/fdm/attitude/{x}-deg" for x in ("phi", "theta", "psi")), *(f"/fdm/v/{x}-rad_sec" for x in "pqr")],
-        [TIMES, TURN.as_euler("ZYX", degrees=True)[:, ::-1], RATE],
-    ),
-    "EuRoC ground truth": (
-        ["#timestamp", "p_x [m]", *(f"q_RS_{x} []" for x in "wxyz"), *(f"b_w_RS_S_{x} [rad s^-1]" for x in "xyz")],
-        [1e9 * TIMES + 1.4e18, 0 * TIMES, np.roll(QUATERNION, 1, axis=1), 0 * RATE],
-    ),
-    "axis and angle": (["t", "axis_x", "axis_y", "axis_z", "angle"], [TIMES, VECTOR / ANGLE[:, None], ANGLE]),
-    "Apple: a unit that is none": (
-        ["t (s)", *(f"motionRotationRate{x}(rad/s)" for x in "XYZ"), *(f"motionQuaternion{x}(R)" for x in "XYZW")],
-        [TIMES, RATE, QUATERNION],
-    ),
-}
-
-
-@pytest.mark.parametrize("name", LOGS)
-def test_logs_are_read_without_options(name, tmp_path):
-    header, columns = LOGS[name]
-    np.savetxt(tmp_path / "log.csv", np.column_stack(columns), "%.17g", ",", header=",".join(header), comments="")
-    recording = load(tmp_path / "log.csv")
-    R_WB, w = recording.data
-    if name.startswith("GMAT"):  # the verdict chooses the order that fits
-        R_WB = load(tmp_path / "log.csv", quaternion="xyzw").data[0]
-    off = 500e-9 if "timestamp" in header[0] else 1e-13  # s: times since 1970 have 256 ns as their last bit
-    np.testing.assert_allclose(recording.t - recording.t[0], TIMES, atol=1.1e-6 if name.startswith("PX4") else off)
-    np.testing.assert_allclose(R_WB, NEAR, atol=1e-12)  # measured: 3e-15
-    assert w is None if name in ("EuRoC ground truth", "axis and angle") else np.allclose(w, RATE, rtol=0, atol=1e-12)
-
-
-def test_tum_has_its_header_in_a_comment(tmp_path):
-    rows = np.column_stack([TIMES, np.zeros((len(TIMES), 3)), QUATERNION])
-    np.savetxt(tmp_path / "log.txt", rows, "%.15f", " ", header="timestamp tx ty tz qx qy qz qw")
-    recording = load(tmp_path / "log.txt")
-    np.testing.assert_allclose(recording.t - recording.t[0], TIMES, atol=1e-14)
-    np.testing.assert_allclose(recording.data[0], NEAR, atol=1e-14)
-
-
 @pytest.mark.parametrize("beginning", GONE)
 def test_a_format_that_is_gone_is_answered_with_what_to_do(beginning, tmp_path):
     file = tmp_path / ("run.csv.gz" if GONE[beginning] == ".gz" else f"run{GONE[beginning]}")  # not any archive, in a folder
