@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.integrate import cumulative_simpson
 
 from conservative.attitude import Array
 
-from ..compare import SIGMAS, Compared, allow, estimate_noise, exact
+from ..compare import HUGE, SIGMAS, Compared, allow, estimate_noise, exact
 from ..mistakes.scenes import with_inertia
 
 FEWEST, LEAST_TURN = 50, 1.0
@@ -30,6 +31,10 @@ JUMP, WITHIN, TURN = 2.0, 0.05, 0.5
 
 Errors of a program grow slowly, or with the angle.
 """
+COHERENT = 0.45
+"""Mean of errors outside over their size, of another motion. Noise in 16 rows or more has 0.25."""
+UNRELATED = 0.5
+"""Smallest median error outside, over the rates in a stretch. Rates with a bias or a kick still follow the free motion."""
 RESTS = 0.15
 """Largest rate of a body at rest, relative to the rates in a stretch."""
 LEAVE = 2.6
@@ -65,7 +70,7 @@ def find_stretch(case: Compared) -> Stretch | None:
     with np.errstate(all="ignore"):
         L = w @ body.inertia
         # Without a torque, the momentum in body axes minus the integral of L x w is constant.
-        constant = np.linalg.solve(body.inertia, (L - cumulative_simpson(np.cross(L, w), x=t, axis=0, initial=0.0)).T).T
+        constant: Any = np.linalg.solve(body.inertia, (L - cumulative_simpson(np.cross(L, w), x=t, axis=0, initial=0.0)).T).T
     if not np.isfinite(constant).all():
         return None
     mean = max(MEAN, min(int(ANGLE / case.gap), len(t) // PART))
@@ -106,7 +111,8 @@ def _longest(free: Array, turns: Array) -> tuple[int, int]:
 
 def _refine(case: Compared, first: int, last: int, noise: float, forced: Array, turns: Array, mean: int) -> Stretch | None:
     """Return the stretch around rows without a torque whose rows are explained by one start, and whether it decides."""
-    n, relative = len(case.t), noise / case.scale
+    n, relative, w = len(case.t), noise / case.scale, case.data[1]
+    assert w is not None
     own = allow((0.0, 0.0), (float(case.noise[0]), relative))
 
     def part(a: int, b: int) -> Compared:
@@ -119,18 +125,22 @@ def _refine(case: Compared, first: int, last: int, noise: float, forced: Array, 
     if not started.passes(started.error):
         return None
     # The same motion before and after.
-    limit, speed = SIGMAS * relative, np.linalg.norm(case.data[1], axis=1)
+    limit, speed = SIGMAS * relative, np.linalg.norm(w, axis=1)
+    typical = float(np.median(speed[first:last])) / case.scale
     reach = max(MEAN, min(int(WITHIN * (last - first)), int(TURN / case.gap)))
     sides = []
     for rows in (np.arange(first)[::-1], np.arange(last, n)):
-        error = _errors(started, case.t[rows] - case.t[first], case.data[1][rows])[: len(inner.t)]
+        total, rows = len(rows), rows[: 2 * len(inner.t)]
+        difference = _differences(started, case.t[rows] - case.t[first], w[rows])
+        error = np.linalg.norm(difference, axis=1)
         means = np.convolve(np.append(0.0, error), np.full(MEAN, 1 / MEAN))[1 : len(error) + 1]
         off = np.flatnonzero((error > limit) | (means > LEAVE * relative))
-        good = int(off[0]) if len(off) else len(error)
-        jump = bool((error[good : good + reach] > JUMP * limit).any())
+        good = int(off[0]) if len(off) else min(len(error), len(inner.t))
+        jump = bool((error[good : good + reach] > JUMP * limit).any()) and _coherent(difference[good:], limit, 4 * mean)
+        jump = jump and bool(np.median(error[good:]) > UNRELATED * typical)
         acts = forced[rows[max(0, good - mean) :]][: 8 * mean].sum() >= OUTSIDE * mean
-        rests = np.median(np.append(speed[rows[good + reach :]][: 8 * mean], [math.inf])) < RESTS * np.median(speed[first:last])
-        sides.append((good, len(rows) - good, jump and bool(acts), jump and bool(rests)))
+        rests = np.median(np.append(speed[rows[good + reach :]][: 8 * mean], [math.inf])) < RESTS * typical * case.scale
+        sides.append((good, total - good, jump and bool(acts), jump and bool(rests)))
     (more_before, _, hand_before, _), (more_after, _, hand_after, _) = sides
     clear = [acts or rests for *_, acts, rests in sides]
     if not any(clear) or any(rows >= MEAN and not side for (_, rows, *_), side in zip(sides, clear, strict=True)):
@@ -161,16 +171,26 @@ def _refine(case: Compared, first: int, last: int, noise: float, forced: Array, 
     return None if reason is None else Stretch(first, last - 1, reason)
 
 
-def _errors(case: Compared, t: Array, w: Array) -> Array:
-    """Return the errors of rates (n,), relative, at times that increase, or decrease from the start on.
+def _differences(case: Compared, t: Array, w: Array) -> Array:
+    """Return the errors of rates (n, 3), relative, at times that increase, or decrease from the start on.
 
     Backwards in time, rates with the other sign are a free motion.
     """
     if not len(t):
-        return np.zeros(0)
+        return np.zeros((0, 3))
     sign = math.copysign(1.0, t[-1])
     made = case.equations().solve(0.0, case.scene.R_WB0[None], sign * case.scene.w_WB_B0[None], np.abs(t))[1][0]
-    return np.nan_to_num(np.linalg.norm(sign * made - w, axis=1) / case.scale, nan=math.inf)
+    return np.nan_to_num((sign * made - w) / case.scale, nan=HUGE)
+
+
+def _coherent(difference: Array, limit: float, count: int) -> bool:
+    """Return whether rows (n, 3) outside are another motion: most of the first ones are off, and not to all sides as noise."""
+    for some in (difference[:count], difference[count : 2 * count]):
+        sizes = np.linalg.norm(some, axis=1)
+        off = len(some) >= MEAN and np.median(sizes) > limit
+        if off and np.linalg.norm(some.mean(axis=0)) > COHERENT * np.sqrt(np.mean(sizes**2)):
+            return True
+    return False
 
 
 def _open(case: Compared) -> str | None:
@@ -195,7 +215,9 @@ def _open(case: Compared) -> str | None:
     d = (case.differences(R, w)[..., 9:] / case.noise[1]).reshape(7, -1)
     slopes = (d[1:] - d[0]) / small
     numbers = -np.linalg.lstsq(slopes.T, d[0], rcond=None)[0][3:]
-    deviations = np.sqrt(np.diag(np.linalg.pinv(slopes @ slopes.T)))[3:]
+    square = slopes @ slopes.T
+    # A number that the rows do not show has a large deviation.
+    deviations = np.sqrt(np.diag(np.linalg.inv(square + 1e-14 * np.trace(square) * np.eye(6))))[3:]
     if (np.abs(numbers) > CERTAIN * deviations + 1e-6).any():
         return None
     return "" if (deviations < SHARP).all() else "they are too few, or too noisy, to show the moments of the body"
