@@ -379,12 +379,14 @@ class Compared:
         n = len(self.t)
 
         # More and more rows: a motion that multiplies small changes is not linear in its start over all rows.
+        noise = np.where(self.open, HOPELESS * MOST_NOISE, 0.0)
+        most_left = max(HOPELESS, float((np.maximum(self.allowed, noise) / self.noise).max()))
         rows = [n] if not free else [k for k in (n // 64, n // 16, n // 4) if k >= 8] + [n]
         for k in rows if moved else ():
             if self.take(slice(0, k)).work(len(moved)) > self.effort.left:
                 break
             p, cost = self._improve(motion, p, k, moved, small, most)
-            if free and cost > k * max(HOPELESS, (self.allowed / self.noise).max()) ** 2:
+            if free and cost > k * most_left**2:
                 break  # no start explains these rows, so none explains more
         R, w = self.evaluate(motion, p[None])
         return p[:6], p[6:], (R[0], w[0])

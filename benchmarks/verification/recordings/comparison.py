@@ -38,8 +38,8 @@ from .units import no_unit
 
 ROUND_OFF = 2e-15
 """Error of an exact motion, rad."""
-EFFORT = 6000
-"""Work of the fits of the start, before a mistake is searched for: about 2 s of an idle core."""
+EFFORT = 20_000
+"""Work of the fits of the start, before a mistake is searched for: about 5 s of an idle core."""
 ROWS_OF_NOISE = 4000
 """Largest number of rows from which noise is estimated."""
 CLEARLY = 2.0

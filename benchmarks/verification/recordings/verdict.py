@@ -56,6 +56,9 @@ NOISE_ONLY = (
 )
 
 
+CUT = "The fit of the start to all rows takes too many motions. A shorter file (--until), --start scene or --error decide"
+
+
 class Unit(NamedTuple):
     """The unit in which errors are shown, and its number for an error of 1: 1 rad, or the largest rate; 0 without data."""
 
@@ -210,15 +213,15 @@ def verify_recording(
         explained = diagnose(whole, recording.layout.attitude in (None, "quaternion"), tell)
     # Numbers that are fitted to rows that a start can explain as well prove nothing.
     decided = comparison.passed or comparison.outliers or comparison.case.far
-    hidden = not decided and error is None and comparison.case.hidden()
-    proven = [explanation for explanation in explained.named if explanation.explains and not (hidden and explanation.numbers)]
+    unclear = "" if decided or error is not None else _unclear(comparison.case)
+    proven = [explanation for explanation in explained.named if explanation.explains and not (unclear and explanation.numbers)]
     verdict, doubt = Verdict.WRONG, ""
     if comparison.passed and shaped:
         verdict, doubt = Verdict.RIGHT, comparison.undecided or recording.doubt(error)
         if from_row and at_rest(comparison.case) and scene.w_WB_B0.any():
             doubt = doubt or RESTING.format(rate=float(np.linalg.norm(scene.w_WB_B0)))
     elif error is None and shaped and not proven:
-        doubt = HIDDEN if hidden else _doubt(comparison.case, comparison.errors, rows.resolved, recording)
+        doubt = unclear or _doubt(comparison.case, comparison.errors, rows.resolved, recording)
     verdict = Verdict.UNDECIDED if doubt else verdict
     case = comparison.case
     if verdict is Verdict.WRONG and not proven and from_row and shaped and not comparison.outliers:
@@ -356,6 +359,11 @@ def _single_rows(comparison: Comparison) -> Explanation:
         key, values = "rates at sign changes", {"rows": float(len(times)), "first": float(row)}
     mistake, before = BY_KEY[key], comparison.worst.max(axis=1).tolist()
     return Explanation((key,), mistake.sentence.format(**values), values, [0.0, 0.0], before, 0.0, 0.0, True)
+
+
+def _unclear(case: Compared) -> str:
+    """Return the sentence on rows that another start may explain; "" if no start does."""
+    return CUT if case.effort.over else HIDDEN if case.hidden() else ""
 
 
 def _doubt(case: Compared, errors: Array, resolved: Array, recording: Recording) -> str:
