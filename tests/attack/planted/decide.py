@@ -149,12 +149,18 @@ class Rows:
         return np.array([rows(p + SMALL * np.eye(len(p))[i], n) - x for i in places]).reshape(-1, len(x)).T / SMALL
 
 
+def start_in(world: World, t: Any, Y: Any, kept: list[int]) -> Any:
+    """Return the state in the first row: of the file, or of the scene, what the file does not have."""
+    y0 = world.start if t[0] == 0 else world.solve(t[:1])[0]
+    q = Y[0, :4] / np.linalg.norm(Y[0, :4]) if 0 in kept else y0[:4]
+    return np.append(q, Y[0, 4:] if 3 in kept else y0[4:])
+
+
 def rows_of(made: Any, t: Any, Y: Any) -> Rows:
     """Return the rows of a file beside the exact motion that starts in the first of them."""
     has, world = LAYOUTS[made.layout].has.split(), made.world
     kept = [*range(3)] * ("R" in has) + [*range(3, 6)] * ("w" in has)
-    y0 = world.start if t[0] == 0 else world.solve(t[:1])[0]
-    y0 = np.append(Y[0, :4] / np.linalg.norm(Y[0, :4]) if "R" in has else y0[:4], Y[0, 4:] if "w" in has else y0[4:])
+    y0 = start_in(world, t, Y, kept)
     grain = np.repeat(made.about["grain"], 3)[kept]
     # A method that diverges is compared at the scale of the exact motion.
     scale = float(np.linalg.norm(Y[:, 4:], axis=1).max()) or 1.0
@@ -191,7 +197,8 @@ def decide(made: Any, t: Any, Y: Any) -> None:
     for name, numbers, left in rivals(made, rows):
         if name != made.mistake and left < IDENTIFIABLE:
             made.same.add(name)
-            blocking += [name] * (numbers <= mine)
+            # A limit that only the first row exceeds is another start.
+            blocking += [name] * (numbers <= mine or (made.kind == "habit" and name == "first row"))
     made.reason = f"the same rows: {blocking[0]}" if blocking else ""
     if made.size < IDENTIFIABLE:
         made.reason = "noise or digits nearly hide it"
@@ -205,6 +212,9 @@ def rivals(made: Any, rows: Rows) -> Iterator[tuple[str, int, float]]:
     for name, numbers, build in explanations(rows):
         if name != made.mistake:
             yield name, numbers, rows.fit(numbers, build)
+    if made.mistake != "first row" and len(rows.t) > 2:
+        others = replace(rows, t=rows.t[1:], Y=rows.Y[1:], y0=start_in(rows.world, rows.t[1:], rows.Y[1:], rows.kept))
+        yield "first row", len(rows.kept), others.fit()
     if made.mistake == "dropped rows" or made.size < CLOSE:
         yield "jittered times", 99, along_the_motion(rows)
     yield from steps(made, rows)

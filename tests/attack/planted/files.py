@@ -161,9 +161,7 @@ def plant(seed: int) -> Planted:
     gap = float(f"{2 * math.pi / per_turn / rate:.2e}")
     turns = n * gap * rate / (2 * math.pi)
     parts = min(int(draw.random.integers(1, 9)), max(1, 4000 // n))
-    # Programs have habits, and no noise of a sensor.
-    weights = {"step": [4, 2, 3, 2, 0.5, 1, 1, 1], "attitude": [4, 2, 3, 2, 0.5, 1, 1, 1], "habit": [4, 2, 3, 2, 1, 0, 0, 0]}
-    noise = draw.pick(NOISES, weights.get(kind, [3, 1, 2, 2, 1, 1.5, 1.5, 1.5]))
+    noise = draw.pick(NOISES, weights_of_noise(kind, mistake))
     names = [name for name in LAYOUTS if fits(name, kind, mistake) and has_times(LAYOUTS[name], world, gap, coarse)]
     layout = draw.pick(names)
     made = Planted(seed, kind, mistake, world, layout, noise)
@@ -193,6 +191,14 @@ def plant(seed: int) -> Planted:
         made.about["gaps"] = n - len(kept)
     write(draw, made, t, Y)
     return made
+
+
+def weights_of_noise(kind: str, mistake: str) -> list[float]:
+    """Return the weights of `NOISES`."""
+    # Programs have habits, and no noise of a sensor; rows that a recorder repeats or interpolates have no noise of their own.
+    if kind == "habit" or mistake in (*SAMPLES, "held rows"):
+        return [4, 2, 3, 2, 1, 0, 0, 0]
+    return [4, 2, 3, 2, 0.5, 1, 1, 1] if kind in ("step", "attitude") else [3, 1, 2, 2, 1, 1.5, 1.5, 1.5]
 
 
 def degenerate(draw: Draw, special: str, rate: float) -> tuple[World, str]:
