@@ -40,6 +40,9 @@ ROUND_OFF = 2e-15
 """Error of an exact motion, rad."""
 EFFORT = 20_000
 """Work of the fits of the start, before a mistake is searched for: about 5 s of an idle core."""
+SAME_START = 1e-8
+"""Largest change of a start, rad or relative to the largest rate, that is none."""
+OTHER_START = "It agrees with a start with other {name} than the scene's. A column of {name} decides, or --start scene"
 ROWS_OF_NOISE = 4000
 """Largest number of rows from which noise is estimated."""
 CLEARLY = 2.0
@@ -226,7 +229,7 @@ def _find_noise(
         n = len(t) if has_closed_form(scene) else int(np.searchsorted(t + shift, start + NUMERICAL / scale))
         (R, w), (a, b) = truth(scene, start, t[:n] + shift), take_rows(data, slice(0, n))
         rest: States = None if a is None else np.swapaxes(R, 1, 2) @ a, None if b is None else b - w
-        if all(x is None or np.isfinite(x).all() for x in (*rest, R, w)):
+        if n >= FEWEST_FOR_NOISE and all(x is None or np.isfinite(x).all() for x in (*rest, R, w)):
             moving = w, np.gradient(w, t[:n], axis=0)
             motion, other = estimate_noise(t[:n], (R, w))[0], estimate_noise(t[:n], rest, moving)
             slow = float(np.median(np.diff(t))) * scale < QUARTER
@@ -323,7 +326,9 @@ def _stretches(case: Compared, from_row: bool) -> tuple[list[Compared], str, Arr
         guessed = replace(guessed.at(initial), free=part.free)
         if guessed.passes(guessed.error):
             name = "attitudes" if case.data[0] is None else "rates"
-            missing = f"It agrees with a start with other {name} than the scene's. A column of {name} decides, or --start scene"
+            # A start that is as good as the same only undoes round-off, which the motion multiplies.
+            same = np.linalg.norm(initial[3 if name == "rates" else 0 :][:3]) <= SAME_START
+            missing = "" if same else OTHER_START.format(name=name)
             parts = [guessed]
     return parts, missing, alone
 

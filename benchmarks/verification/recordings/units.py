@@ -145,6 +145,8 @@ def _disagreement(values: Array, layout: Layout, options: Options) -> float:
     assert w is not None
     turned = Rotation.from_matrix(np.swapaxes(R[:-1], 1, 2) @ R[1:]).as_rotvec()
     expected = (w[:-1] + w[1:]) / 2 * np.diff(t)[:, None]
+    near = np.diff(t) <= 2 * np.median(np.diff(t))  # over a gap, the mean of two rates is no mean rate
+    turned, expected = turned[near], expected[near]
     size = min(float(np.linalg.norm(turned)), float(np.linalg.norm(expected)))
     return float(np.linalg.norm(turned - expected)) / size if size else math.inf  # a body at rest shows no units
 
