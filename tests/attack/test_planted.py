@@ -24,8 +24,6 @@ from .effort import SEED, count
 from .planted import files, mistakes, motion, run, tables, worlds
 from .planted.layouts import LAYOUTS
 
-PUBLISHED = range(10_000, 11_000)
-"""Seeds of the page, which nobody saw before the last changes of the verification."""
 QUICK = (2, 7, 13, 15, 17, 21, 25, 29, 30, 45, 53, 63, 67, 75, 89, 92, 96, 113, 116, 135, 142, 149, 154, 157, 163)
 """Seeds of quick files of many kinds."""
 MORE = (
@@ -48,15 +46,15 @@ def _attacked(cache):
         path for root in (Path(verification.__file__).parent, Path(tables.__file__).parent) for path in root.rglob("*.py")
     )
     code = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()[:12]
-    first = PUBLISHED.start if SEED == 1 else 1_000_000 * SEED
-    return run.run_all(Path(cache.mkdir("planted")) / f"{code}.jsonl", range(first, first + count(len(PUBLISHED))))
+    first = tables.PUBLISHED.start if SEED == 1 else 1_000_000 * SEED
+    return run.run_all(Path(cache.mkdir("planted")) / f"{code}.jsonl", range(first, first + count(len(tables.PUBLISHED))))
 
 
 @pytest.mark.attack
 def test_rates_of_errors_are_those_of_the_page(request):
     rows = _attacked(request.config.cache)
     _, page = tables.read_page(tables.PAGE.read_text(encoding="utf-8"))
-    assert max(of for _, of in page.values()) == len(PUBLISHED)
+    assert max(of for _, of in page.values()) == len(tables.PUBLISHED)
     worse = tables.compare(tables.rates(rows), page)
     assert not worse, "\n".join([*worse, *(run.line_of(row) for row in rows if row["complaint"])])
 
@@ -147,7 +145,7 @@ def test_page_has_the_rates_and_worse_ones_are_found(tmp_path):
 
 
 def test_every_mistake_layout_and_noise_is_planted():
-    chosen = [files.choose(worlds.Draw(seed)) for seed in PUBLISHED]
+    chosen = [files.choose(worlds.Draw(seed)) for seed in tables.PUBLISHED]
     names = {name for names, _ in files.MISTAKES.values() for name in names}
     assert {name for _, name in chosen} >= names - {"rates in radians"}
     assert sum(kind == "right" for kind, _ in chosen) >= 400
