@@ -28,7 +28,7 @@ SIGMAS = 7.0
 """Allowed error over the standard deviation of the noise."""
 ROUND_OFF = 1e-13
 """Smallest noise that fits assume: round-off in double precision."""
-LONGEST, NUMERICAL = 100.0, 5000.0
+LONGEST, NUMERICAL = 100.0, 2000.0
 """Angles, rad, of the rows that are explained, and of the rows that are compared if the motion has no closed form."""
 FEWEST_FOR_NOISE = 14
 """Smallest number of rows from which noise is estimated: differences of order 9 need several."""
@@ -57,6 +57,8 @@ PERTURBED = 1e-8, 1e-12
 """Changes of initial states that show how the motion multiplies them. The second is used where the first becomes large."""
 STRAIGHT, NARROWED = 0.03, 6
 """Largest difference of motions from which slopes are computed, and the number of trials with smaller changes."""
+QUARTER = math.pi / 2
+"""Turn from row to row, rad, from which differences of a motion do not become smaller with their order."""
 MOST_NOISE = 0.05
 """Largest noise, rad or relative to the largest rate. Larger differences of rows are motion."""
 MOSTLY_ALONG = 0.9

@@ -50,8 +50,9 @@ from .scene_digits import find_scene_digits
 from .solution import Equations, has_closed_form, integrate_rates, truth
 from .trials import Drifting, by_drift, by_habit, by_rule, compose, fits, remark_on_damping
 
-FEWEST, MOST = 100, 2500
-"""Rows that are explained: at least `FEWEST`, if the file has them, and at most `MOST`, evenly chosen."""
+FEWEST, FEW, MOST = 100, 12, 2500
+"""Rows that are explained: at least `FEWEST`, if the file has them, or `FEW`, if they are far apart without a closed form,
+and at most `MOST`, evenly chosen."""
 EFFORT = 20_000
 """Work of a search with a `share` of 1, in stretches (`Effort`): about 5 s of an idle core."""
 MOST_BREAKS = 50
@@ -104,12 +105,14 @@ def diagnose(
     """
     whole = _before_divergence(whole)
     case = whole.first(LONGEST, FEWEST)  # 100 rad, or 100 rows if they take longer
-    case = case.first(NUMERICAL, 2) if has_closed_form(case.scene) else case.first(NUMERICAL / 10, 4)
+    case = case.first(NUMERICAL, 2) if has_closed_form(case.scene) else case.first(NUMERICAL / 10, FEW)
     if case.error.max() <= case.allowed.max() and len(case.t) < len(whole.t):
         case = whole  # the error is later
     stride = -(-len(case.t) // MOST)
     case = case.take(slice(None, None, stride)).change(stride=stride, effort=Effort(0.0))
-    early = whole.first(LONGEST, FEWEST).change(effort=case.effort)
+    early = whole.first(LONGEST, FEWEST)
+    early = early if has_closed_form(case.scene) else early.first(NUMERICAL / 10, FEW)
+    early = early.change(effort=case.effort)
     tried, over = list[Explanation](), False
     for name, search in SEARCHES.items():
         if not kinds & search.kinds or len(case.t) < search.least or (whole.far and not search.whole):
@@ -202,11 +205,20 @@ def _usable_readings(case: Compared, quaternion: bool) -> list[tuple[Reading, ..
     usable = [reading for reading in _without_numbers(READINGS) if fits(reading, case)]
     if not quaternion:
         usable = [reading for reading in usable if not reading.quaternions]
-    if case.from_row and case.scene.free:  # its motion is the same in any axes of the world
+    if case.from_row and not in_world(case.scene):  # its motion is the same in any axes of the world
         usable = [reading for reading in usable if not reading.of_world]
     of = {name: [(), *((reading,) for reading in usable if reading.of == name)] for name in (ATTITUDES, RATES)}
     pairs = [a + b for a, b in product(of[ATTITUDES], of[RATES])]
     return pairs[1:] + [(reading,) for reading in usable if reading.of == AXES]
+
+
+def in_world(scene: Scene) -> bool:
+    """Return whether the motion of a scene depends on the axes of the world."""
+    varying = None if scene.damping is None else scene.damping.of_time
+    of_attitude = (scene.torque is not None and (scene.torque.of_attitude or scene.torque.frame != "body")) or (
+        varying is not None and varying.of_attitude
+    )
+    return scene.potential is not None or bool(of_attitude)
 
 
 def _readings(case: Compared, asked: _Asked) -> Explanations:
@@ -220,7 +232,12 @@ def _readings(case: Compared, asked: _Asked) -> Explanations:
         R, w = motion(near.scene.R_WB0[None], near.scene.w_WB_B0[None], np.zeros((1, 0)), len(near.t))
         # A reading that makes the first rows much worse than they are is not tried on all rows.
         if (near.errors(R[0], w[0]) <= 2 * case.error[:, :10].max() + 10 * case.allowed.max()).all():
-            explanation = _read_again(case, trial) if any(case.open) else attempt(case, trial)
+            explanation = _read_again(case, trial) if any(case.open) else None
+            if explanation is None:
+                # Fits of the start take most of the work. Where noise is open, only readings that leave little are worth it.
+                explanation = attempt(case.change(free=()) if any(case.open) else case, trial)
+                if any(case.open) and explanation is not None and not explanation.explains and explanation.rest < LITTLE:
+                    explanation = attempt(case, trial)
             yield explanation if _moves(case, explanation) else None
 
 
@@ -321,7 +338,7 @@ def _digits_of(scene: Scene, mistake: SceneMistake, factor: float) -> str:
 def _units(case: Compared, asked: _Asked) -> Explanations:
     """Yield times in other units than seconds."""
     for time in TIMES:
-        if not time.unit or case.turned * time.unit > 2 * LONGEST or case.scene.loads or not has_closed_form(case.scene):
+        if not time.unit or case.turned * time.unit > 2 * LONGEST:
             continue
         if case.step is None:
             explanation = attempt(case, compose(time))

@@ -20,6 +20,7 @@ from ..compare import (
     HOPELESS,
     MOST_NOISE,
     NUMERICAL,
+    QUARTER,
     SIGMAS,
     TINY,
     UNITS_OF_DIGITS,
@@ -57,8 +58,6 @@ CLEAR = 1e-3
 """Smallest mean error of readings in other units. A body at rest and one that turns uniformly fit in all."""
 STARTS = 1e-3
 """Largest difference of a first row from the start of a scene, rad and relative."""
-QUARTER = math.pi / 2
-"""Turn from row to row, rad, from which differences of a motion do not become smaller with their order."""
 
 
 @dataclass(frozen=True, eq=False)

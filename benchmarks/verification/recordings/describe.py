@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from conservative.attitude import Array, angle_between
 from conservative.number_text import number
 
-from ..compare import FEWEST_FOR_NOISE, FLOOR, Compared, estimate_noise
+from ..compare import FEWEST_FOR_NOISE, FLOOR, QUARTER, Compared, estimate_noise
 
 GAP = 1.5
 """Smallest time between two rows, in typical times, in which rows are missing."""
@@ -163,7 +163,7 @@ def at_rest(case: Compared) -> bool:
 
 def only_noise(case: Compared) -> bool:
     """Return whether the rows may be noise about a body at rest: their noise is as large as all of their motion."""
-    if len(case.t) < FEWEST_FOR_NOISE:
+    if len(case.t) < FEWEST_FOR_NOISE or case.gap > QUARTER:  # turns from row to row look like noise
         return False
     (R, w), noise = case.data, estimate_noise(case.t, case.data)[0]
     rest = Rotation.from_matrix(np.eye(3)[None] if R is None else R)
