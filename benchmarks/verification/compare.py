@@ -325,12 +325,18 @@ class Compared:
 
     def leaves_noise(self, R: Array, w: Array) -> Array:
         """Return for attitudes and rates (2,) whether their noise is open, and a motion leaves differences that are noise."""
+        noise = [is_noise(left, along) for left, along in self._left(R, w)]
+        return np.array([a and b and x is not None for a, b, x in zip(self.open, noise, self.data, strict=True)])
+
+    def along(self, R: Array, w: Array) -> list[bool]:
+        """Return for attitudes and rates whether what a motion leaves lies along it."""
+        return [lies_along(left, along) for left, along in self._left(R, w)]
+
+    def _left(self, R: Array, w: Array) -> list[tuple[Array, Array]]:
+        """Return what a motion leaves, (n, 3), of attitudes and rates, and directions (n, 3) in which errors of times lie."""
         a, b = (y if x is None else x for x, y in zip(self.data, (R, w), strict=True))
         left, moved = differ(R, w, a, b, self.scale), np.gradient(w, self.t, axis=0) if len(self.t) > 1 else 0 * w
-        return np.array([
-            open_ and x is not None and is_noise(left[:, part], along)
-            for open_, x, part, along in zip(self.open, self.data, (slice(3), slice(3, 6)), (w, moved), strict=True)
-        ])  # fmt: skip
+        return [(left[:, :3], w), (left[:, 3:], moved)]
 
     def size(self, error: Array) -> float:
         """Return the root of the mean square of errors, in units of the noise."""

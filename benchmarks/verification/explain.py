@@ -40,7 +40,7 @@ from .mistakes.attitudes import DRIFTS, RULES, Drift, align, integrate
 from .mistakes.equations import EQUATIONS
 from .mistakes.habits import HABITS, PART_STANDSTILLS, ROWS, STANDSTILLS, Habit, Standstill
 from .mistakes.mistake import Number
-from .mistakes.readings import ATTITUDES, AXES, RATES, READINGS, Reading
+from .mistakes.readings import ATTITUDES, AXES, RATES, READINGS, TURN, Reading
 from .mistakes.scenes import PARTS as SCENE_PARTS
 from .mistakes.scenes import SCENES, SIZES, SceneMistake, with_inertia
 from .mistakes.steps import INTEGRATORS
@@ -319,8 +319,11 @@ def _within_digits(case: Compared, explanation: Explanation) -> Explanation:
     mistake = BY_KEY[explanation.keys[0]]
     if "factor" not in explanation.values or not isinstance(mistake, SceneMistake):
         return explanation
-    remark = _digits_of(case.scene, mistake, explanation.values["factor"])
-    return replace(explanation, sentence=explanation.sentence + remark)
+    remark, trial = _digits_of(case.scene, mistake, explanation.values["factor"]), explanation.trial
+    if trial is None:
+        return explanation
+    trial = replace(trial, remark=trial.remark + remark)
+    return replace(explanation, trial=trial, sentence=trial.sentence(explanation.values))
 
 
 def _digits_of(scene: Scene, mistake: SceneMistake, factor: float) -> str:
@@ -779,7 +782,7 @@ def _turns_of_world(case: Compared) -> tuple[Trial, Array]:
     angles = np.arange(8) * np.pi / 4
     around = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     turns = np.vstack([np.zeros((1, 2)), around * np.pi / 2, around[:3:2] * np.pi])
-    return compose(replace(mistake, numbers=mistake.numbers[:2], sentence=mistake.sentence.replace("{turn_3:.5g}", "0"))), turns
+    return compose(replace(mistake, numbers=mistake.numbers[:2])), turns
 
 
 def _best_turn(case: Compared, trial: Trial, turns: Array) -> Explanation | None:
@@ -789,7 +792,8 @@ def _best_turn(case: Compared, trial: Trial, turns: Array) -> Explanation | None
     assert motion is not None
     many = np.broadcast_to(case.scene.R_WB0, (n, 3, 3)), np.broadcast_to(case.scene.w_WB_B0, (n, 3))
     left = np.linalg.norm(near.differences(*motion(*many, turns, len(near.t))), axis=(1, 2))
-    explanations = [attempt(case, trial, turns[k].tolist(), most=30) for k in np.argsort(left, kind="stable")[:3]]
+    known = {number.name: 0.0 for number in TURN[len(trial.numbers) :]}
+    explanations = [attempt(case, trial, turns[k].tolist(), most=30, known=known) for k in np.argsort(left, kind="stable")[:3]]
     shortest = [_shortest_turn(explanation) for explanation in explanations if explanation is not None]
     return min(
         shortest,
@@ -800,8 +804,8 @@ def _best_turn(case: Compared, trial: Trial, turns: Array) -> Explanation | None
 
 def _shortest_turn(explanation: Explanation) -> Explanation:
     """Return an explanation by a turn of at most half a revolution."""
-    turn = Rotation.from_rotvec([*explanation.values.values(), 0.0][:3]).as_rotvec().tolist()
-    values, trial = dict(zip(explanation.values, turn, strict=False)), explanation.trial
+    turn = Rotation.from_rotvec([*explanation.values.values()]).as_rotvec().tolist()
+    values, trial = dict(zip(explanation.values, turn, strict=True)), explanation.trial
     return replace(explanation, values=values, sentence=explanation.sentence if trial is None else trial.sentence(values))
 
 

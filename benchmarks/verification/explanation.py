@@ -132,6 +132,8 @@ class Explanation:
         motion = None if trial is None or not trial.numbers else trial.build(case)
         if trial is None or motion is None or any(number.name not in self.values for number in trial.numbers):
             return self
+        if self.sentence != trial.sentence(self.values):  # it says more than its numbers
+            return self
         values = [self.values[number.name] for number in trial.numbers]
         intervals = 2 * case.deviations(motion, np.array([*[0.0] * 6, *values]), INTERVAL)[6:]
         if not np.isfinite(intervals).all():
@@ -142,7 +144,7 @@ class Explanation:
             if d < max(1.0, abs(x))  # the rows do not determine the others
         }
         known = self.values | measured
-        return replace(self, values=known, sentence=self.sentence.replace(trial.sentence(self.values), trial.sentence(known)))
+        return replace(self, values=known, sentence=trial.sentence(known))
 
     def again(self, case: Compared) -> Explanation | None:
         """Return the explanation of another case by the same mistakes with the same numbers, without any fit.

@@ -116,7 +116,7 @@ def prepare(scene: Scene, recording: Recording, from_row: bool, error: float | N
         open=(bool(unknown[0]), bool(unknown[1])),
         effort=Effort(EFFORT),
     )
-    if any(case.open) and (case.error.max(axis=1) > case.allowed).any() and case.turned <= NUMERICAL / 10:
+    if any(case.open) and case.turned <= NUMERICAL / 10 and (case.error.max(axis=1) > case.allowed).any():
         # The rows alone do not show their noise. The exact motion may leave nothing else.
         _, _, made = case.fit(exact(case), np.zeros(0), np.zeros(0))
         white = case.leaves_noise(*made)

@@ -147,8 +147,8 @@ def _disagreement(values: Array, layout: Layout, options: Options) -> float:
     expected = (w[:-1] + w[1:]) / 2 * np.diff(t)[:, None]
     near = np.diff(t) <= 2 * np.median(np.diff(t))  # over a gap, the mean of two rates is no mean rate
     turned, expected = turned[near], expected[near]
-    size = min(float(np.linalg.norm(turned)), float(np.linalg.norm(expected)))
-    return float(np.linalg.norm(turned - expected)) / size if size else math.inf  # a body at rest shows no units
+    off, *sizes = (float(np.median(np.linalg.norm(x, axis=1))) for x in (turned - expected, turned, expected))
+    return off / min(sizes) if min(sizes) else math.inf  # a body at rest shows no units
 
 
 _OURS = ("w", "wb", "b"), ("omega", "bn", "b")

@@ -385,7 +385,8 @@ def _doubt(case: Compared, errors: Array, resolved: Array, recording: Recording)
     ):
         d = case.differences(*case.exact)
         lags = [abs(float((d[k:] * d[:-k]).sum() / (d * d).sum())) for k in range(1, min(20, len(d) // 4) + 1)]
-        if max(lags) < 0.3:  # motion that looks like noise from row to row repeats after some rows
+        # Motion that looks like noise from row to row repeats after some rows, and errors of times lie along the motion.
+        if max(lags) < 0.3 and not any(case.along(*case.exact)):
             return "What is left looks like noise, but the rows are too far apart to tell. More rows a turn, or --error, decide"
     return ""
 
