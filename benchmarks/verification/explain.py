@@ -423,10 +423,31 @@ def _by_own_times(case: Compared, gap: float, end: float) -> Explanation | None:
         if case.free and not later.passes(later.error):  # the start was fitted to times that are wrong
             later = later.at(later.fit(exact(later), np.zeros(0), np.zeros(0))[0])
         return explain(case, Trial((DROPPED,), _nowhere), later.exact, values, numbers=2)
+    if (held := _held_again(case)).any() and np.abs(off[~held]).max(initial=0.0) < 0.01 * gap:
+        mistake, places = BY_KEY["held rows"], np.flatnonzero(held)
+        made = tuple(None if x is None else _hold(x, held) for x in case.exact)
+        values = {"period": float(round(len(held) / len(places))), "first": float(places[0] * case.stride + 1)}
+        return explain(case, Trial((mistake,), _nowhere), made, values, numbers=2)  # type: ignore[arg-type]
     if abs(float(np.mean(off))) < 0.5 * size:
         # Every row has a time of its own: this ranks behind explanations by one or two fitted numbers.
         return explain(case, Trial((JITTERED,), _nowhere), sample(tau), {"jitter": size}, numbers=3)
     return None
+
+
+def _held_again(case: Compared) -> Any:
+    """Return which rows repeat the row before in all numbers, while the motion goes on."""
+    same = np.ones(len(case.t), bool)
+    same[0] = False
+    for x in case.data:
+        if x is not None:
+            same[1:] &= (np.diff(x, axis=0).reshape(len(same) - 1, -1) == 0).all(axis=1)
+    moved = np.append(0.0, (np.abs(np.diff(case.exact[0], axis=0)).max(axis=(1, 2))))
+    return same & (moved > STILL) if same.sum() < HALF * len(same) else same & False
+
+
+def _hold(x: Array, held: Any) -> Array:
+    """Return rows (n, ...) of which some repeat the one before."""
+    return x[np.maximum.accumulate(np.where(held, 0, np.arange(len(held))))]
 
 
 def _nowhere(case: Compared) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
 
@@ -23,6 +23,8 @@ ROWS, STEP_EFFORT = 400, 1.0
 """Largest number of rows that candidates are compared with, and the work of one step from all of them."""
 STEPS_AT_MOST, PARTS = 20_000, 2000
 """Largest numbers of steps of a method, over the file and between two rows."""
+SINGLE, CLEAR = 2.0**-26, 1e-3
+"""Rounding from which a file is in single precision, and the largest share that a method leaves whose steps round, too."""
 CLOSE = 1e-7
 """Time between two values of a motor for its slope, relative, if it is a function."""
 MOST_KEPT = 50_000
@@ -204,10 +206,21 @@ def _run_best(case: Compared, linear: Linearised) -> Iterator[Explanation]:
                     break
             if explanation is None:
                 continue
+            explanation = _with_rounding(case, explanation)
             yield explanation
             if explanation.explains:
                 proven = True
                 break
+
+
+def _with_rounding(case: Compared, explanation: Explanation) -> Explanation:
+    """Return the explanation by a method whose steps round in single precision, as the file does, if it leaves no more."""
+    rounded = np.array(case.rounded)
+    steps = float(case.t[-1] - case.start) / explanation.values["step"]
+    grown = case.allowed * np.maximum(1.0, np.sqrt(steps))
+    left = np.array(explanation.left)
+    single = rounded.max() >= SINGLE and explanation.share < CLEAR
+    return replace(explanation, explains=explanation.explains or bool(single and (left <= grown).all()))
 
 
 class Linearised:

@@ -237,7 +237,8 @@ def _find_noise(
             apart = other[1] & (slow | (motion < 0.3 * other[0]) | (other[0] < TINY))
             better = apart & (~resolved | (other[0] < noise))
             noise, resolved = np.where(better, other[0], noise), resolved | apart
-    return np.where(resolved & (noise / sizes <= MOST_NOISE), noise / sizes, 0.0), resolved
+    resolved = resolved & (noise / sizes <= MOST_NOISE)  # larger differences are motion between rows that are far apart
+    return np.where(resolved, noise / sizes, 0.0), resolved
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,6 +25,8 @@ ANGULAR = 1.0, math.pi / 180
 """Units that angles and rates without a unit may have: rad and deg."""
 AGREES, DISAGREES = 0.1, 0.5
 """Largest disagreement of attitudes and rates in their units, and the smallest one in all others, relative to the turns."""
+SAME_SIZE, OTHER_SIZE = 0.7, 2.0
+"""Logarithms of ratios of turns and rates: up to the first their sizes agree, from the second on they do not."""
 
 
 def no_unit(path: Path | None, names: Sequence[str]) -> BadInput:
@@ -83,8 +85,13 @@ def find_units(values: Array, layout: Layout, options: Options) -> None:
     usual = [1.0 if short and kind == layout.attitude else _usual(parts[kind]) for kind in open_]
     expected = (parts["time"][time[0]], *usual)
     ranked = rank_units(values, layout, options)
-    # One choice agrees, and all others clearly do not.
-    if len(ranked) > 1 and ranked[0][0] < AGREES and ranked[1][0] > DISAGREES:
+    # One choice agrees, and all others clearly do not. In wrong axes, or in another order, only the sizes agree.
+    clear = len(ranked) > 1 and ranked[0][0] < AGREES and ranked[1][0] > DISAGREES
+    if not clear:
+        by_size = rank_units(values, layout, options, sizes_alone=True)
+        if len(by_size) > 1 and by_size[0][0] < SAME_SIZE and by_size[1][0] > OTHER_SIZE:
+            ranked, clear = by_size, True
+    if clear:
         for kind, size, usual_size in zip(("time", *open_), ranked[0][1], expected, strict=True):
             if size != usual_size:
                 unit = f"{size:g} s" if kind == "time" else "rad" if size == 1.0 else "deg"
@@ -120,8 +127,11 @@ def set_sizes(layout: Layout, kinds: Sequence[str], sizes: Sequence[Any]) -> Non
             layout.used[kind] = dict.fromkeys(layout.used[kind], size)
 
 
-def rank_units(values: Array, layout: Layout, options: Options) -> list[tuple[float, Any]]:
-    """Return choices of units that no column names, of the time and of other quantities, by their disagreement."""
+def rank_units(values: Array, layout: Layout, options: Options, sizes_alone: bool = False) -> list[tuple[float, Any]]:
+    """Return choices of units that no column names, of the time and of other quantities, by their disagreement.
+
+    With `sizes_alone` the sizes of turns from row to row are compared with rates, and not their axes.
+    """
     some, parts = values[:400], dict(layout.used)
     (time, size), *_ = parts["time"].items()
     open_ = [kind for kind, part in parts.items() if any(map(math.isnan, part.values()))]
@@ -132,14 +142,18 @@ def rank_units(values: Array, layout: Layout, options: Options) -> list[tuple[fl
     for sizes in product(*choices) if layout.attitude and parts["rates"] and len(some) > 2 else ():
         set_sizes(layout, ("time", *open_), sizes)
         orders = (options.quaternion,) if options.quaternion or not layout.numbered else ORDERS
-        off = [_disagreement(some * layout.sizes, layout, replace(options, quaternion=order)) for order in orders]
+        known = [replace(options, quaternion=order) for order in orders]
+        off = [_disagreement(some * layout.sizes, layout, each, sizes_alone) for each in known]
         ranked.append((min(off), sizes))
     layout.used = parts
     return sorted(ranked)
 
 
-def _disagreement(values: Array, layout: Layout, options: Options) -> float:
-    """Return the difference between turns from row to row and the mean rates there, relative to the smaller of them."""
+def _disagreement(values: Array, layout: Layout, options: Options, sizes_alone: bool = False) -> float:
+    """Return the difference between turns from row to row and the mean rates there, relative to the smaller of them.
+
+    With `sizes_alone` it is the logarithm of the ratio of their sizes.
+    """
     t, (R, w), _ = convert(values, layout, options)
     assert R is not None
     assert w is not None
@@ -148,7 +162,9 @@ def _disagreement(values: Array, layout: Layout, options: Options) -> float:
     near = np.diff(t) <= 2 * np.median(np.diff(t))  # over a gap, the mean of two rates is no mean rate
     turned, expected = turned[near], expected[near]
     off, *sizes = (float(np.median(np.linalg.norm(x, axis=1))) for x in (turned - expected, turned, expected))
-    return off / min(sizes) if min(sizes) else math.inf  # a body at rest shows no units
+    if not min(sizes):
+        return math.inf  # a body at rest shows no units
+    return abs(math.log(sizes[0] / sizes[1])) if sizes_alone else off / min(sizes)
 
 
 _OURS = ("w", "wb", "b"), ("omega", "bn", "b")
