@@ -116,15 +116,19 @@ def prepare(scene: Scene, recording: Recording, from_row: bool, error: float | N
         open=(bool(unknown[0]), bool(unknown[1])),
         effort=Effort(EFFORT),
     )
-    if any(case.open) and case.turned <= NUMERICAL / 10 and (case.error.max(axis=1) > case.allowed).any():
+    if any(case.open) and case.turned <= NUMERICAL / 4 and (case.error.max(axis=1) > case.allowed).any():
         # The rows alone do not show their noise. The exact motion may leave nothing else.
-        _, _, made = case.fit(exact(case), np.zeros(0), np.zeros(0))
+        usual = np.where(case.open, np.maximum(case.noise, MOST_NOISE / 5), case.noise)
+        initial, _, _ = replace(case, noise=usual).fit(exact(case), np.zeros(0), np.zeros(0))
+        made = case.at(initial).exact
         white = case.leaves_noise(*made)
         if white.any() and (white | (case.errors(*made).max(axis=1) <= case.allowed)).all():
             left = np.sqrt((case.errors(*made) ** 2).mean(axis=1) / 3)
             noise = np.where(white, left, noise)
             allowed, resolved = allow(rounded, noise, error), np.logical_or(resolved, white)
             case = replace(case, allowed=allowed.errors, noise=allowed.noise, open=(False, False))
+    elif any(case.open) and not case.far:
+        case.effort.spend(math.inf)  # the start is not fitted: the motion is too long
     return Rows(recording, case, allowed, noise, resolved, notes)
 
 
