@@ -252,21 +252,33 @@ def _read_again(case: Compared, trial: Trial) -> Explanation | None:
         R, w = reading.read(R, w)
     again, motion = case.read(R, w), trial.build(case)
     scale = case.scale if w is None else float(np.linalg.norm(w, axis=1).max()) or 1.0
-    noise, resolved = estimate_noise(case.t, again.data)
-    have = np.array([x is not None for x in again.data])
-    if not resolved[have].all() or (noise / [1.0, scale] > MOST_NOISE).any():
-        return None
-    allowed = allow(case.rounded, noise / [1.0, scale])
-    again = replace(again, scale=scale, allowed=allowed.errors, noise=allowed.noise, open=(False, False))
-    if not again.passes(again.error) and (again.error.max(axis=1) < HOPELESS * again.allowed).all():
-        again = again.at(again.fit(exact(again), np.zeros(0), np.zeros(0))[0])
-    if not again.passes(again.error) or motion is None:
+    settled = _settle_noise(replace(again, scale=scale))
+    if settled is None or motion is None:
         return None
     made = motion(case.scene.R_WB0[None], case.scene.w_WB_B0[None], np.zeros((1, 0)), len(case.t))
-    explanation = explain(case, trial, (made[0][0], made[1][0]))
-    left = (again.error.max(axis=1) * [1.0, scale / case.scale]).tolist()
+    return _of_other_rows(case, trial, settled, (made[0][0], made[1][0]))
+
+
+def _settle_noise(case: Compared) -> Compared | None:
+    """Return a case whose rows show their noise, with a start that explains them; None if there is none."""
+    sizes = np.array([1.0, case.scale])
+    noise, resolved = estimate_noise(case.t, case.data)
+    have = np.array([x is not None for x in case.data])
+    if not resolved[have].all() or (noise / sizes > MOST_NOISE).any():
+        return None
+    allowed = allow(case.rounded, noise / sizes)
+    case = replace(case, allowed=allowed.errors, noise=allowed.noise, open=(False, False))
+    if not case.passes(case.error) and (case.error.max(axis=1) < HOPELESS * case.allowed * max(1.0, case.turned)).all():
+        case = case.at(case.fit(exact(case), np.zeros(0), np.zeros(0))[0])
+    return case if case.passes(case.error) else None
+
+
+def _of_other_rows(case: Compared, trial: Trial, settled: Compared, made: tuple[Array, Array]) -> Explanation:
+    """Return the explanation of a case by a trial that turns it into rows which the exact motion explains."""
+    explanation = explain(case, trial, made)
+    left = (settled.error.max(axis=1) * [1.0, settled.scale / case.scale]).tolist()
     share = float(max(left) / max(*explanation.plain, 1e-15))
-    return replace(explanation, left=left, share=share, rest=share, size=again.size(again.error), explains=share < HALF)
+    return replace(explanation, left=left, share=share, rest=share, size=settled.size(settled.error), explains=share < HALF)
 
 
 def _changes(case: Compared, asked: _Asked) -> Explanations:
@@ -343,9 +355,14 @@ def _units(case: Compared, asked: _Asked) -> Explanations:
     for time in TIMES:
         if not time.unit or case.turned * time.unit > 2 * LONGEST:
             continue
-        if case.step is None:
-            explanation = attempt(case, compose(time))
-            yield explanation if _moves(case, explanation) else None
+        if case.step is not None:
+            continue
+        settled = None
+        if any(case.open):  # rows in another unit of time hide their noise
+            settled = _settle_noise(replace(case, t=case.start + (case.t - case.start) * time.unit))
+        trial = compose(time)
+        explanation = attempt(case, trial) if settled is None else _of_other_rows(case, trial, settled, settled.exact)
+        yield explanation if _moves(case, explanation) else None
 
 
 def _moves(case: Compared, explanation: Explanation | None) -> bool:
@@ -425,7 +442,11 @@ def _by_own_times(case: Compared, gap: float, end: float) -> Explanation | None:
         return explain(case, Trial((DROPPED,), _nowhere), later.exact, values, numbers=2)
     if (held := _held_again(case)).any() and np.abs(off[~held]).max(initial=0.0) < 0.01 * gap:
         mistake, places = BY_KEY["held rows"], np.flatnonzero(held)
-        made = tuple(None if x is None else _hold(x, held) for x in case.exact)
+        right = case
+        if case.free:  # the start was fitted to rows that are held
+            rest = case.take(~held)
+            right = case.at(rest.fit(exact(rest), np.zeros(0), np.zeros(0))[0])
+        made = tuple(_hold(x, held) for x in right.exact)
         values = {"period": float(round(len(held) / len(places))), "first": float(places[0] * case.stride + 1)}
         return explain(case, Trial((mistake,), _nowhere), made, values, numbers=2)  # type: ignore[arg-type]
     if abs(float(np.mean(off))) < 0.5 * size:
