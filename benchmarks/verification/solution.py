@@ -76,18 +76,18 @@ class Equations:
         rotor, wheel, back, resistance = NOTHING, NOTHING, np.empty((0, 4)), np.empty((0, 3, 3))
         constant, own = {"body": NOTHING, "world": NOTHING}, list[Torque]()
         if body.motor is not None:
-            rotor = _each_time(body.motor.at, t, window)
+            rotor = _each_time(body.motor, t, window)
             wheel = self.reaction * (rotor @ body.inverse.T)
         elif body.rotor_momentum is not None:
             rotor = np.repeat(body.rotor_momentum[None], len(t), axis=0)
         if torque is not None and torque.of_attitude:
             own.append(_own_torque(torque, t, window))
         elif torque is not None:
-            constant[torque.frame] = _each_time(torque.at, t, window)
+            constant[torque.frame] = _each_time(torque, t, window)
         if of_time and of_time.of_attitude:
             own.append(_own_damping(damping, t, window))
         elif damping is not None:
-            resistance = _each_time(damping.at, t, window)
+            resistance = _each_time(damping, t, window)
         if isinstance(scene.potential, Turning) and self.law is not None:
             half = scene.potential.orbit.rate / 2 * t[:, None]
             back = np.concatenate([np.cos(half), -np.sin(half) * scene.potential.orbit.normal_W], axis=1)
@@ -275,9 +275,16 @@ class Derivative:
         return self.loads._replace(own=np.ascontiguousarray(sum(torque(R, w) for torque in self.own)))
 
 
-def _each_time(value: Callable[..., Array], t: Array, window: Window) -> Array:
-    """Return the values (n, ...) of a load at times (n,), s."""
-    return np.array([value(time, None, window) for time in t.tolist()])
+def _each_time(load: Any, t: Array, window: Window) -> Array:
+    """Return the values (n, ...) of a load at times (n,), s. Between two break points, a table is linear."""
+    value = getattr(load, "value", None)
+    if isinstance(value, tuple) and math.isfinite(window[0]) and len(t) > 2:
+        first, last = load.at(float(t[0]), None, window), load.at(float(t[-1]), None, window)
+        share = (t - t[0]) / (t[-1] - t[0])
+        return first + share.reshape(-1, *(1,) * first.ndim) * (last - first)
+    if value is not None and not callable(value) and not isinstance(value, tuple):
+        return np.repeat(load.at(float(t[0]), None, window)[None], len(t), axis=0)
+    return np.array([load.at(time, None, window) for time in t.tolist()])
 
 
 def _own_torque(torque: Any, t: Array, window: Window) -> Torque:
