@@ -57,12 +57,13 @@ def judged(folder, names, attitudes, rates=W, t=T, scene=FREE):
 def test_attitudes_of_any_size(names, tmp_path):
     usual = ATTITUDES[names]
     assert judged(tmp_path, names, usual)
-    for size in (1e200, -1e200, 1e-200, 5e-324, np.inf, 0.0):
+    for size in (1e200, -1e200, 1e-200, 5e-324):
         some = usual.copy()
-        some[5] = size if size == 0 or not np.isfinite(size) else some[5] * size
+        some[5] = some[5] * size
         assert not judged(tmp_path, names, some)
-    some[5] = np.nan  # a gap
-    assert judged(tmp_path, names, some)
+    for lost in (np.nan, np.inf, 0.0):  # a sensor that lost sight: such a row is left out, but an angle of 0 is an attitude
+        some[5] = lost
+        assert judged(tmp_path, names, some) == ("axis" not in names or lost != 0)
     if len(names.split(",")) in (4, 9) and "axis" not in names:
         for size in (1e200, 1e155, 1e-200):
             assert judged(tmp_path, names, usual * size) is None
