@@ -115,7 +115,7 @@ def weigh(scene: Scene) -> float:
     varying = None if scene.damping is None else scene.damping.of_time
     slow = (scene.torque is not None and scene.torque.of_attitude) or (varying is not None and varying.of_attitude)
     in_python = scene.potential is not None and Equations(scene).law is None
-    weight = 1.0 + 0.2 * bool(scene.features & IN_TIME) + 2.5 * bool(scene.loads)
+    weight = 1.0 + 0.2 * bool(scene.features & IN_TIME) + 0.7 * bool(scene.loads)
     return weight + 40.0 * (slow or in_python)  # functions of attitude are called for each state in each iteration
 
 

@@ -65,6 +65,8 @@ SHRUNK = 1e-3
 """A motion in other units of time that moves by less than this share of the exact motion stands still."""
 SHOWN = 10.0
 """A motion in other units of time that moves by less than this number of allowed errors shows nothing."""
+FEW_AT_END = 3
+"""Rows at the end that repeat the one before, from which the motion halts."""
 AFTER_ERROR, STEPS_OF_HABITS = 12, (*range(1, 13), 15, 16, 20, 24, 25, 30, 40, 50)
 """Rows from the first error on from which the step of a habit is found, and the steps between two rows that are tried."""
 NEARLY, SMALL_SHARE, REFINED = 1e-2, 1e-6, 2
@@ -462,6 +464,8 @@ def _held_again(case: Compared) -> Any:
     for x in case.data:
         if x is not None:
             same[1:] &= (np.diff(x, axis=0).reshape(len(same) - 1, -1) == 0).all(axis=1)
+    if same[-FEW_AT_END:].all():  # a motion that halts, and no rows that repeat
+        return same & False
     moved = np.append(0.0, (np.abs(np.diff(case.exact[0], axis=0)).max(axis=(1, 2))))
     return same & (moved > STILL) if same.sum() < HALF * len(same) else same & False
 

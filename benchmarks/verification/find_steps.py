@@ -15,7 +15,7 @@ from conservative.scene import Scene
 from .compare import HOPELESS, LINEAR, Compared, Solution, differ, linearise, weigh
 from .explanation import Explanation, Trial, attempt
 from .mistakes.steps import INTEGRATORS, Integrator, Step
-from .solution import Derivative, Equations, truth
+from .solution import Derivative, Equations, slopes_of_motor, truth
 
 CHUNK, CHUNK_EFFORT = 256, 100
 """Steps after which work is counted, and their work (`Effort`)."""
@@ -25,8 +25,6 @@ STEPS_AT_MOST, PARTS = 20_000, 2000
 """Largest numbers of steps of a method, over the file and between two rows."""
 SINGLE, CLEAR = 2.0**-26, 1e-3
 """Rounding from which a file is in single precision, and the largest share that a method leaves whose steps round, too."""
-CLOSE = 1e-7
-"""Time between two values of a motor for its slope, relative, if it is a function."""
 MOST_KEPT = 50_000
 """Largest number of times whose loads are kept."""
 CANDIDATES = 5
@@ -76,7 +74,7 @@ class Slope:
         nothing = np.zeros((3, 1))
         if self.body.motor is None:
             return self.equations.at(t), nothing, nothing
-        changes = np.array([slope_of_motor(self.body.motor, time) for time in t.tolist()])
+        changes = slopes_of_motor(self.body.motor, t)
         return self.equations.at(t), self.equations.wheel(t), self.equations.reaction * (self.body.inverse @ changes.T)
 
     def _apply(self, derivative: Derivative, wheel: Array, faster: Array, y: Array) -> Array:
@@ -87,16 +85,6 @@ class Slope:
         out = derivative(moved)
         out[4:] -= faster.reshape(shape)
         return out
-
-
-def slope_of_motor(motor: Any, t: float) -> Array:
-    """Return the change (3,) of a motor's momentum at a time and just after it, N m."""
-    if isinstance(motor.value, tuple):
-        times, values = motor.value
-        k = int(np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(times) - 2))
-        return np.asarray((values[k + 1] - values[k]) / (times[k + 1] - times[k]))
-    e = CLOSE * max(abs(t), 1.0)
-    return np.asarray((motor.at(t + e) - motor.at(t)) / e)
 
 
 def pack(R: Array, w: Array) -> Array:

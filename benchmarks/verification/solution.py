@@ -29,6 +29,8 @@ NODES, ANGLE, SWEEPS = 32, 2.0, 60
 SMALLEST, TAIL = 1e-6, 3e-15
 """Shortest stretch that is halved again, relative to the first one, and largest last coefficients of a good stretch."""
 _EPS = 2.0**-52
+CLOSE = 1e-7
+"""Time between two values of a motor for its slope, relative, if it is a function."""
 NOTHING = np.empty((0, 3))
 """Stands for no load."""
 Torque = Callable[[Array, Array], Array]
@@ -125,7 +127,7 @@ class Equations:
         body = self.scene.body
         if body.motor is None:
             return 0 * t
-        return self.reaction * (body.inverse @ np.array([body.motor.at(time) for time in t.tolist()]).T)
+        return self.reaction * (body.inverse @ _each_time(body.motor, t, (-math.inf, math.inf)).T)
 
     def solve(self, start: float, R: Array, w: Array, t: Array) -> tuple[Array, Array]:
         """Return attitudes (B, n, 3, 3), rates (B, n, 3) at times (n,), s, of states (B, 3, 3), (B, 3) at `start`."""
@@ -276,15 +278,32 @@ class Derivative:
 
 
 def _each_time(load: Any, t: Array, window: Window) -> Array:
-    """Return the values (n, ...) of a load at times (n,), s. Between two break points, a table is linear."""
+    """Return the values (n, ...) of a load at times (n,), s, as `OfTime.at` does for one time."""
     value = getattr(load, "value", None)
-    if isinstance(value, tuple) and math.isfinite(window[0]) and len(t) > 2:
-        first, last = load.at(float(t[0]), None, window), load.at(float(t[-1]), None, window)
-        share = (t - t[0]) / (t[-1] - t[0])
-        return first + share.reshape(-1, *(1,) * first.ndim) * (last - first)
-    if value is not None and not callable(value) and not isinstance(value, tuple):
+    if isinstance(value, tuple):
+        times, values = value
+        inside = np.clip(t, math.nextafter(window[0], math.inf), math.nextafter(window[1], -math.inf))
+        i = np.searchsorted(times, inside, side="right")
+        k = np.clip(i, 1, len(times) - 1)
+        share = ((t - times[k - 1]) / (times[k] - times[k - 1])).reshape(-1, *(1,) * (values.ndim - 1))
+        made = values[k - 1] + share * (values[k] - values[k - 1])
+        made[i == 0], made[i == len(times)] = values[0], values[-1]
+        return np.asarray(made)
+    if value is not None and not callable(value):
         return np.repeat(load.at(float(t[0]), None, window)[None], len(t), axis=0)
     return np.array([load.at(time, None, window) for time in t.tolist()])
+
+
+def slopes_of_motor(motor: Any, t: Array) -> Array:
+    """Return the changes (n, 3) of a motor's momentum at times (n,), s, and just after them, N m."""
+    if isinstance(motor.value, tuple):
+        times, values = motor.value
+        k = np.clip(np.searchsorted(times, t, side="right"), 1, len(times) - 1)
+        return np.asarray((values[k] - values[k - 1]) / (times[k] - times[k - 1])[:, None])
+    e = CLOSE * np.maximum(np.abs(t), 1.0)
+    return np.array(
+        [(motor.at(time + near) - motor.at(time)) / near for time, near in zip(t.tolist(), e.tolist(), strict=True)]
+    )
 
 
 def _own_torque(torque: Any, t: Array, window: Window) -> Torque:

@@ -39,8 +39,10 @@ from .units import no_unit
 
 ROUND_OFF = 2e-15
 """Error of an exact motion, rad."""
-EFFORT = 20_000
+EFFORT = 30_000
 """Work of the fits of the start, before a mistake is searched for: about 5 s of an idle core."""
+LONGEST_FIT = 500.0
+"""Largest turn, rad, over which the start of rows whose noise is open is fitted."""
 SAME_START = 1e-8
 """Largest change of a start, rad or relative to the largest rate, that is none."""
 OTHER_START = "It agrees with a start with other {name} than the scene's. A column of {name} decides, or --start scene"
@@ -116,7 +118,7 @@ def prepare(scene: Scene, recording: Recording, from_row: bool, error: float | N
         open=(bool(unknown[0]), bool(unknown[1])),
         effort=Effort(EFFORT),
     )
-    if any(case.open) and case.turned <= NUMERICAL / 4 and (case.error.max(axis=1) > case.allowed).any():
+    if any(case.open) and case.turned <= LONGEST_FIT and (case.error.max(axis=1) > case.allowed).any():
         # The rows alone do not show their noise. The exact motion may leave nothing else.
         usual = np.where(case.open, np.maximum(case.noise, MOST_NOISE / 5), case.noise)
         initial, _, _ = replace(case, noise=usual).fit(exact(case), np.zeros(0), np.zeros(0))
@@ -127,8 +129,6 @@ def prepare(scene: Scene, recording: Recording, from_row: bool, error: float | N
             noise = np.where(white, left, noise)
             allowed, resolved = allow(rounded, noise, error), np.logical_or(resolved, white)
             case = replace(case, allowed=allowed.errors, noise=allowed.noise, open=(False, False))
-    elif any(case.open) and not case.far:
-        case.effort.spend(math.inf)  # the start is not fitted: the motion is too long
     return Rows(recording, case, allowed, noise, resolved, notes)
 
 

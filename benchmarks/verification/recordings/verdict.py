@@ -22,7 +22,7 @@ from ..explain import Diagnosis, diagnose, fit_moments
 from ..explanation import Explanation
 from ..finding import Cause, Finding, Verdict, Verification, uncapitalised
 from ..mistakes import BY_KEY
-from .comparison import Comparison, compare, prepare
+from .comparison import LONGEST_FIT, Comparison, compare, prepare
 from .describe import Description, at_rest, only_noise, unseen
 from .rows import OUTSIDE, REPEATED
 from .table import Recording
@@ -363,7 +363,8 @@ def _single_rows(comparison: Comparison) -> Explanation:
 
 def _unclear(case: Compared) -> str:
     """Return the sentence on rows that another start may explain; "" if no start does."""
-    return CUT if case.effort.over else HIDDEN if case.hidden() else ""
+    cut = case.effort.over or (any(case.open) and not case.far and case.turned > LONGEST_FIT)
+    return CUT if cut else HIDDEN if case.hidden() else ""
 
 
 def _doubt(case: Compared, errors: Array, resolved: Array, recording: Recording) -> str:
