@@ -768,6 +768,8 @@ def _rows(case: Compared, asked: _Asked) -> Explanations:
     for row in ROWS:
         if periodic if row.periodic else near:
             made: Any = row.change(case.exact, case.data, off)
+            if any(x is None for x in made):  # it is about rates, and the file has none
+                continue
             values = {"first": float(places[0] * case.stride + 1)}
             values |= {"period": float(gaps[0] * case.stride)} if row.periodic else {"rows": float(len(places))}
             yield explain(fine, Trial((row,), _nowhere), made, values, numbers=len(values) - (not row.periodic) + row.any)

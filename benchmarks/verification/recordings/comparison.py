@@ -118,14 +118,15 @@ def prepare(scene: Scene, recording: Recording, from_row: bool, error: float | N
         open=(bool(unknown[0]), bool(unknown[1])),
         effort=Effort(EFFORT),
     )
-    if any(case.open) and case.turned <= LONGEST_FIT and (case.error.max(axis=1) > case.allowed).any():
+    some = case.first(LONGEST_FIT, FEWEST_FOR_NOISE)
+    if any(case.open) and some.turned <= 2 * LONGEST_FIT and (some.error.max(axis=1) > case.allowed).any():
         # The rows alone do not show their noise. The exact motion may leave nothing else.
         usual = np.where(case.open, np.maximum(case.noise, MOST_NOISE / 5), case.noise)
-        initial, _, _ = replace(case, noise=usual).fit(exact(case), np.zeros(0), np.zeros(0))
-        made = case.at(initial).exact
-        white = case.leaves_noise(*made)
-        if white.any() and (white | (case.errors(*made).max(axis=1) <= case.allowed)).all():
-            left = np.sqrt((case.errors(*made) ** 2).mean(axis=1) / 3)
+        initial, _, _ = replace(some, noise=usual).fit(exact(some), np.zeros(0), np.zeros(0))
+        made = some.at(initial).exact
+        white = some.leaves_noise(*made)
+        if white.any() and (white | (some.errors(*made).max(axis=1) <= case.allowed)).all():
+            left = np.sqrt((some.errors(*made) ** 2).mean(axis=1) / 3)
             noise = np.where(white, left, noise)
             allowed, resolved = allow(rounded, noise, error), np.logical_or(resolved, white)
             case = replace(case, allowed=allowed.errors, noise=allowed.noise, open=(False, False))

@@ -363,7 +363,8 @@ def _single_rows(comparison: Comparison) -> Explanation:
 
 def _unclear(case: Compared) -> str:
     """Return the sentence on rows that another start may explain; "" if no start does."""
-    cut = case.effort.over or (any(case.open) and not case.far and case.turned > LONGEST_FIT)
+    some = case.first(LONGEST_FIT, FEWEST_FOR_NOISE)
+    cut = case.effort.over or (any(case.open) and not case.far and some.turned > 2 * LONGEST_FIT)
     return CUT if cut else HIDDEN if case.hidden() else ""
 
 
