@@ -115,11 +115,14 @@ def test_single_rows_are_two_in_a_hundred(rows, cause):
     assert [(each.numbers["row"], each.numbers["time"]) for each in found.causes] == [(11, T[10])] * bool(cause)
 
 
-@pytest.mark.parametrize(("turn", "expected"), [(1.45, "right"), (2.0, "undecided")])
-def test_noise_is_told_from_motion_up_to_a_quarter_of_a_turn_a_row(turn, expected):
+@pytest.mark.parametrize(
+    ("turn", "faster", "expected"), [(1.45, 1.0, "right"), (4.0, 1.0, "right"), (1.45, 1.001, "wrong"), (4.0, 1.001, "wrong")]
+)
+def test_noise_is_what_the_exact_motion_leaves_in_rows_at_any_distance(turn, faster, expected):
+    """Differences of rows show noise up to a quarter of a turn a row. Beyond it, what is left has to be white."""
     t = np.arange(401) * turn / SCALE
-    w = free_body(SCENE.body, SCENE.R_WB0, SCENE.w_WB_B0, t)[1] + noise(0.01, len(t))
-    assert verify(None, w, t, SCENE.rename("long", t_end=float(t[-1]))).verdict == expected
+    w = free_body(SCENE.body, SCENE.R_WB0, SCENE.w_WB_B0, faster * t)[1] + noise(0.01, len(t))
+    assert (verify(None, w, t, SCENE.rename("long", t_end=float(t[-1]))).verdict == "right") == (expected == "right")
 
 
 @pytest.mark.parametrize(("size", "expected"), [(25.0, True), (36.0, False)])
