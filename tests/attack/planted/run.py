@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import shlex
 import signal
 import tempfile
@@ -200,9 +201,10 @@ def line_of(row: dict[str, Any]) -> str:
     )
 
 
-def _work(path: Path, seeds: list[int]) -> None:
+def _work(path: Path, seeds: list[int], parent: int) -> None:
     for _ in run(path, seeds, lambda text: print(text, flush=True)):
-        pass
+        if os.getppid() != parent:  # a run that is killed leaves no process behind
+            return
 
 
 def run_all(path: Path, seeds: Sequence[int], count: int = 2) -> list[dict[str, Any]]:
@@ -212,7 +214,7 @@ def run_all(path: Path, seeds: Sequence[int], count: int = 2) -> list[dict[str, 
     done = {row["seed"] for part in (path, *parts, *others) for row in load(part)}
     left = [seed for seed in seeds if seed not in done]
     start = get_context("spawn").Process  # compiled code and its threads do not survive a fork everywhere
-    workers = [start(target=_work, args=(part, left[i::count])) for i, part in enumerate(parts)]
+    workers = [start(target=_work, args=(part, left[i::count], os.getpid())) for i, part in enumerate(parts)]
     for worker in workers:
         worker.start()
     for worker in workers:
