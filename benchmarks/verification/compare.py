@@ -61,6 +61,9 @@ QUARTER = math.pi / 2
 """Turn from row to row, rad, from which differences of a motion do not become smaller with their order."""
 MOST_NOISE = 0.05
 """Largest noise, rad or relative to the largest rate. Larger differences of rows are motion."""
+LEAST_CURVED, MOSTLY_FLAT = 1e-3, 0.1
+"""Turn of the motion from row to row, rad, from which it has a plane, and the median sine to the plane of differences in it;
+0.5 for noise."""
 MOSTLY_ALONG = 0.9
 """Median cosine between differences and the motion from which they are errors of times; 0.5 for noise."""
 CONVERGED = 1e-3
@@ -584,13 +587,21 @@ def is_noise(left: Array, along: Array) -> bool:
 
 
 def lies_along(left: Array, along: Array) -> bool:
-    """Return whether most differences (n, 3) lie along directions (n, 3). A third of them does by chance."""
+    """Return whether most differences (n, 3) lie along directions (n, 3), or in the plane in which these turn.
+
+    Errors of times lie along the motion, and interpolated rows are off towards the inside of its curve. Noise is all around.
+    """
     sizes = np.linalg.norm(left, axis=1) * np.linalg.norm(along, axis=1)
     some = sizes > 0
     if np.linalg.matrix_rank(left, tol=1e-9 * (np.abs(left).max() or 1.0)) < 2 or some.sum() < len(left) / 2:
         return False  # differences in one direction show nothing
     cosines = np.abs((left * along).sum(axis=1))[some] / sizes[some]
-    return bool(np.median(cosines) > MOSTLY_ALONG)
+    across = np.cross(along, np.gradient(along, axis=0))
+    turning = np.linalg.norm(across, axis=1) * np.linalg.norm(left, axis=1)
+    curved = some & (np.linalg.norm(across, axis=1) > LEAST_CURVED * np.linalg.norm(along, axis=1) ** 2)
+    flat = np.abs((left * across).sum(axis=1))[curved] / turning[curved]
+    in_plane = curved.sum() > len(left) / 2 and np.median(flat) < MOSTLY_FLAT
+    return bool(np.median(cosines) > MOSTLY_ALONG or in_plane)
 
 
 def estimate_noise(t: Array, data: States, along: States = (None, None)) -> tuple[Array, Array]:

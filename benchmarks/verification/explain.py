@@ -400,7 +400,9 @@ def _times(case: Compared, asked: _Asked) -> Explanations:
     later = np.append(0, np.arange(max(1, len(case.t) // 20), len(case.t)))  # the first row, which is exact, and later ones
     for time in TIMES:
         if not time.of_step and not time.unit:
-            yield attempt(case.take(later), compose(time))
+            some = case.take(later)
+            explanation = attempt(some, compose(time))
+            yield explanation if _moves(some, explanation) else None
     if "rows" in asked.kinds:
         gap = float(np.median(np.diff(case.t)))
         yield from _own_times(case, gap, float(case.t[-1] + 0.1 * (case.t[-1] - case.start) + 2 * gap))

@@ -30,6 +30,7 @@ from ..compare import (
     allow,
     estimate_noise,
     exact,
+    is_noise,
     linearise,
     take_rows,
 )
@@ -240,6 +241,11 @@ def _find_noise(
             # The estimate from the exact motion contains no noise. An estimate that is clearly larger is noise.
             resolved &= (motion < 0.3 * noise) | (noise < TINY)
             apart = other[1] & (slow | (motion < 0.3 * other[0]) | (other[0] < TINY))
+            if not slow:  # what is left of an aliased motion looks like noise from row to row, and is not white
+                turns = np.zeros((n, 3)) if rest[0] is None else Rotation.from_matrix(rest[0]).as_rotvec()
+                rates = np.zeros((n, 3)) if rest[1] is None else rest[1] / scale
+                white = [is_noise(left, along) for left, along in zip((turns, rates), moving, strict=True)]
+                apart = apart & (np.array(white) | (other[0] < TINY))
             better = apart & (~resolved | (other[0] < noise))
             noise, resolved = np.where(better, other[0], noise), resolved | apart
     resolved = resolved & (noise / sizes <= MOST_NOISE)  # larger differences are motion between rows that are far apart

@@ -160,6 +160,8 @@ def _disagreement(values: Array, layout: Layout, options: Options, sizes_alone: 
     turned = Rotation.from_matrix(np.swapaxes(R[:-1], 1, 2) @ R[1:]).as_rotvec()
     expected = (w[:-1] + w[1:]) / 2 * np.diff(t)[:, None]
     near = np.diff(t) <= 2 * np.median(np.diff(t))  # over a gap, the mean of two rates is no mean rate
+    if not near.any():  # times that are no times
+        return math.inf
     turned, expected = turned[near], expected[near]
     off, *sizes = (float(np.median(np.linalg.norm(x, axis=1))) for x in (turned - expected, turned, expected))
     if not min(sizes):
