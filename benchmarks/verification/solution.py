@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -14,13 +14,15 @@ from numpy.polynomial import chebyshev
 from conservative.attitude import Array, from_quaternion, to_quaternion
 from conservative.errors import PotentialFailed, TorqueFailed
 from conservative.features import IN_TIME
-from conservative.kernels import picard
 from conservative.potentials.field import FieldPotential
 from conservative.potentials.load import Window
 from conservative.potentials.potential import torque_W
 from conservative.potentials.turning import Turning, static_part
 from conservative.references.exact.method import Exact, free_body, lagrange_top
 from conservative.scene import Scene
+
+if TYPE_CHECKING:
+    from conservative.kernels import picard
 
 States = tuple[Array | None, Array | None]
 """Attitudes (n, 3, 3), body to world, and rates (n, 3), rad/s, body axes; None if the file has none."""
@@ -44,6 +46,13 @@ _INTEGRAL_T = np.ascontiguousarray(
     (chebyshev.chebvander(_X, NODES) @ chebyshev.chebint(np.eye(NODES), lbnd=-1) @ _COEFFICIENTS).T
 )
 """From values at the points to their integrals from -1 to each point, transposed."""
+
+
+def _picard() -> Any:
+    """Return the kernels, which motions in closed form do without: they import numba."""
+    from conservative.kernels import picard
+
+    return picard
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +104,7 @@ class Equations:
             back = np.concatenate([np.cos(half), -np.sin(half) * scene.potential.orbit.normal_W], axis=1)
         elif scene.potential is not None and self.law is None:
             own.append(_own_field(scene.potential, t, self.field))
-        loads = picard.AtTimes(rotor, wheel, back, constant["body"], constant["world"], resistance, np.empty((0, 0, 3)))
+        loads = _picard().AtTimes(rotor, wheel, back, constant["body"], constant["world"], resistance, np.empty((0, 0, 3)))
         return Derivative(self, loads, own)
 
     @cached_property
@@ -107,6 +116,7 @@ class Equations:
     def terms(self, bodies: int) -> picard.Terms:
         """Return the terms of the equations of a number of states."""
         J, inverse = (np.ascontiguousarray(x) for x in (self.scene.body.inertia, self.scene.body.inverse))
+        picard = _picard()
         mode, tensor = picard.HALF_TURNED if self.half_turned else picard.USUAL, J
         if self.fixed is not None:
             mode, tensor = picard.FIXED, np.ascontiguousarray(self.fixed)
@@ -208,7 +218,7 @@ class Flow:
         wheel = np.empty((0, 0, 3))
         if self.equations.scene.body.motor is not None:
             wheel = np.stack([self.equations.wheel(times).T for times in t])
-        picard.sample(np.array(self.ends), series, np.ascontiguousarray(self.first), np.ascontiguousarray(t), wheel, R, w)
+        _picard().sample(np.array(self.ends), series, np.ascontiguousarray(self.first), np.ascontiguousarray(t), wheel, R, w)
         return R, w
 
 
@@ -250,7 +260,7 @@ class Derivative:
         out, y = np.empty(y.shape), np.ascontiguousarray(y)
         if y.shape[1] not in self.terms:
             self.terms[y.shape[1]] = self.equations.terms(y.shape[1])
-        picard.slopes(self.equations.law, self.terms[y.shape[1]], self._with_own(y), y, out)
+        _picard().slopes(self.equations.law, self.terms[y.shape[1]], self._with_own(y), y, out)
         return out
 
     def sweep(self, y: Array, half: float, tolerance: float) -> tuple[Array, int]:
@@ -260,10 +270,10 @@ class Derivative:
         """
         Y, terms, y = np.repeat(y[:, :, None], NODES, axis=2), self.equations.terms(y.shape[1]), np.ascontiguousarray(y)
         if not self.own:
-            return Y, picard.sweep(self.equations.law, terms, self.loads, y, Y, half, tolerance, _INTEGRAL_T, SWEEPS)[0]
+            return Y, _picard().sweep(self.equations.law, terms, self.loads, y, Y, half, tolerance, _INTEGRAL_T, SWEEPS)[0]
         last = math.inf
         for number in range(1, SWEEPS):  # functions of Python between two iterations
-            _, change = picard.sweep(self.equations.law, terms, self._with_own(Y), y, Y, half, 0.0, _INTEGRAL_T, 2)
+            _, change = _picard().sweep(self.equations.law, terms, self._with_own(Y), y, Y, half, 0.0, _INTEGRAL_T, 2)
             if change < tolerance or (change < 1e-13 and change > 0.5 * last) or not change < 1e30:
                 return Y, number
             last = change

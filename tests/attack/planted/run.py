@@ -214,7 +214,8 @@ def run_all(path: Path, seeds: Sequence[int], count: int = 2) -> list[dict[str, 
     done = {row["seed"] for part in (path, *parts, *others) for row in load(part)}
     left = [seed for seed in seeds if seed not in done]
     start = get_context("spawn").Process  # compiled code and its threads do not survive a fork everywhere
-    workers = [start(target=_work, args=(part, left[i::count], os.getpid())) for i, part in enumerate(parts)]
+    shares = [(part, left[i::count], os.getpid()) for i, part in enumerate(parts) if left[i::count]]
+    workers = [start(target=_work, args=share) for share in shares]
     for worker in workers:
         worker.start()
     for worker in workers:
