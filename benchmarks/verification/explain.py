@@ -38,7 +38,7 @@ from .find_steps import PARTS, STEPS_AT_MOST, Linearised, by_step, find_steps
 from .mistakes import BY_KEY
 from .mistakes.attitudes import DRIFTS, RULES, Drift, align, integrate
 from .mistakes.equations import EQUATIONS
-from .mistakes.habits import HABITS, PART_STANDSTILLS, ROWS, STANDSTILLS, Habit, Standstill
+from .mistakes.habits import HABITS, HELD, PART_STANDSTILLS, ROWS, STANDSTILLS, Habit, Standstill
 from .mistakes.mistake import Number
 from .mistakes.readings import ATTITUDES, AXES, RATES, READINGS, TURN, Reading
 from .mistakes.scenes import PARTS as SCENE_PARTS
@@ -207,14 +207,14 @@ def _usable_readings(case: Compared, quaternion: bool) -> list[tuple[Reading, ..
     usable = [reading for reading in _without_numbers(READINGS) if fits(reading, case)]
     if not quaternion:
         usable = [reading for reading in usable if not reading.quaternions]
-    if case.from_row and not in_world(case.scene):  # its motion is the same in any axes of the world
+    if case.from_row and not _depends_on_world(case.scene):  # its motion is the same in any axes of the world
         usable = [reading for reading in usable if not reading.of_world]
     of = {name: [(), *((reading,) for reading in usable if reading.of == name)] for name in (ATTITUDES, RATES)}
     pairs = [a + b for a, b in product(of[ATTITUDES], of[RATES])]
     return pairs[1:] + [(reading,) for reading in usable if reading.of == AXES]
 
 
-def in_world(scene: Scene) -> bool:
+def _depends_on_world(scene: Scene) -> bool:
     """Return whether the motion of a scene depends on the axes of the world."""
     varying = None if scene.damping is None else scene.damping.of_time
     of_attitude = (scene.torque is not None and (scene.torque.of_attitude or scene.torque.frame != "body")) or (
@@ -445,14 +445,14 @@ def _by_own_times(case: Compared, gap: float, end: float) -> Explanation | None:
             later = later.at(later.fit(exact(later), np.zeros(0), np.zeros(0))[0])
         return explain(case, Trial((DROPPED,), _nowhere), later.exact, values, numbers=2)
     if (held := _held_again(case)).any() and np.abs(off[~held]).max(initial=0.0) < 0.01 * gap:
-        mistake, places = BY_KEY["held rows"], np.flatnonzero(held)
+        places = np.flatnonzero(held)
         right = case
         if case.free:  # the start was fitted to rows that are held
             rest = case.take(~held)
             right = case.at(rest.fit(exact(rest), np.zeros(0), np.zeros(0))[0])
-        made = tuple(_hold(x, held) for x in right.exact)
+        made: Any = HELD.change(right.exact, case.data, held)
         values = {"period": float(round(len(held) / len(places))), "first": float(places[0] * case.stride + 1)}
-        return explain(case, Trial((mistake,), _nowhere), made, values, numbers=2)  # type: ignore[arg-type]
+        return explain(case, Trial((HELD,), _nowhere), made, values, numbers=2)
     if abs(float(np.mean(off))) < 0.5 * size:
         # Every row has a time of its own: this ranks behind explanations by one or two fitted numbers.
         return explain(case, Trial((JITTERED,), _nowhere), sample(tau), {"jitter": size}, numbers=3)
@@ -470,11 +470,6 @@ def _held_again(case: Compared) -> Any:
         return same & False
     moved = np.append(0.0, (np.abs(np.diff(case.exact[0], axis=0)).max(axis=(1, 2))))
     return same & (moved > STILL) if same.sum() < HALF * len(same) else same & False
-
-
-def _hold(x: Array, held: Any) -> Array:
-    """Return rows (n, ...) of which some repeat the one before."""
-    return x[np.maximum.accumulate(np.where(held, 0, np.arange(len(held))))]
 
 
 def _nowhere(case: Compared) -> None:

@@ -206,8 +206,9 @@ PART_STANDSTILLS = tuple(
         ("rates of 0", "The rates are 0", "attitudes", 0.0, 1),
     )
 )
+HELD = RowHabit("held rows", "One in {period:.0f} rows repeats the one before, from row {first:.0f} on", _held)
 ROWS = (
-    RowHabit("held rows", "One in {period:.0f} rows repeats the one before, from row {first:.0f} on", _held),
+    HELD,
     RowHabit(
         "order xyzw in some rows",
         "One in {period:.0f} rows has the quaternion in the order xyzw, from row {first:.0f} on, the others wxyz",
