@@ -46,6 +46,9 @@ LONGEST_FIT = 500.0
 """Largest turn, rad, over which the start of rows whose noise is open is fitted."""
 SAME_START = 1e-8
 """Largest change of a start, rad or relative to the largest rate, that is none."""
+COLOURED = (
+    "What is left is as large as the noise of the rows, and no noise: it is not white. --error decides, or more rows a turn"
+)
 OTHER_START = "It agrees with a start with other {name} than the scene's. A column of {name} decides, or --start scene"
 ROWS_OF_NOISE = 4000
 """Largest number of rows from which noise is estimated."""
@@ -287,6 +290,7 @@ def compare(case: Compared, recording: Recording, from_row: bool) -> Comparison:
     parts, missing, alone = _stretches(case, from_row)
     errors = np.concatenate([part.error for part in parts], axis=1)
     passed = all(part.passes(part.error) and not _late(part) for part in parts)
+    coloured = passed and len(parts) == 1 and _coloured(parts[0])
     whole = len(parts) == 1 and len(errors[0]) == len(case.t)
     if not passed and not (whole and (parts[0].error[:, 0] <= case.allowed).all()):  # stretches and starts of right motions
         parts, errors = [replace(case, growth=parts[0].growth)], case.error
@@ -296,7 +300,9 @@ def compare(case: Compared, recording: Recording, from_row: bool) -> Comparison:
         worst, compared, bad, shape = _compare_all(parts, recording, -shift if from_row else 0.0)
         passed = passed and bad is None
         outliers = outliers or ([] if bad is None else [bad])
-    return Comparison(case, parts, errors, worst, compared, alone, passed, outliers, undecided or missing, shape, shift)
+    return Comparison(
+        case, parts, errors, worst, compared, alone, passed, outliers, undecided or missing or COLOURED * coloured, shape, shift
+    )
 
 
 def _stretches(case: Compared, from_row: bool) -> tuple[list[Compared], str, Array]:
@@ -394,6 +400,21 @@ def _compare_all(
                 current[i] = replace(part, scene=scene, start=float(piece.t[-1]))
         count += len(t)
     return worst, count, bad, shape
+
+
+def _coloured(case: Compared) -> bool:
+    """Return whether noise allows the errors, and what the motion leaves is not noise, whatever the start is."""
+    digits = np.maximum(FLOOR, UNITS_OF_DIGITS * np.array(case.rounded))
+    noisy = (case.allowed > (1 + 1e-9) * digits) & [x is not None for x in case.data]
+    if not noisy.any() or len(case.t) < FEWEST_FOR_NOISE:
+        return False
+    case = replace(case, open=(bool(noisy[0]), bool(noisy[1])))
+    if (case.leaves_noise(*case.exact) == noisy).all():
+        return False
+    if not case.free:
+        return True
+    made = case.at(case.fit(exact(case), np.zeros(0), np.zeros(0))[0]).exact
+    return not (case.leaves_noise(*made) == noisy).all()
 
 
 def _late(case: Compared) -> bool:

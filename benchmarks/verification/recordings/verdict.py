@@ -22,7 +22,7 @@ from ..explain import Diagnosis, diagnose, fit_moments
 from ..explanation import Explanation
 from ..finding import Cause, Finding, Verdict, Verification, uncapitalised
 from ..mistakes import BY_KEY
-from .comparison import LONGEST_FIT, Comparison, compare, prepare
+from .comparison import LONGEST_FIT, Comparison, Rows, compare, prepare
 from .describe import Description, at_rest, only_noise, unseen
 from .rows import OUTSIDE, REPEATED
 from .table import Recording
@@ -32,6 +32,8 @@ ACCURATE, ACCURATE_SINGLE = 1e-6, 1e-4
 """Errors that a good solver may leave, in double and in single precision."""
 SHAPE = 1e-6
 """Departure from a rotation that a good solver may leave."""
+SHAPE_OF_ONE = 1e-3
+"""Departure that an attitude that never changes may have: it can be written with three digits."""
 UNITS = "rad", "of the largest rate"
 FAR = 0.05
 """Error, rad or relative to the largest rate, above which a motion is a different one."""
@@ -203,7 +205,7 @@ def verify_recording(
     recording, notes = rows.recording, rows.notes
     tell("compare")
     comparison = compare(rows.case, recording, from_row)
-    shape_allowed = max(SHAPE, UNITS_OF_DIGITS * recording.digits[1], SIGMAS * rows.noise[0]) if error is None else error
+    shape_allowed = error or _allow_shape(rows, recording)
     shaped, explained = comparison.shape[0] <= shape_allowed, Diagnosis()
     if comparison.outliers and not comparison.passed:
         explained = Diagnosis([_single_rows(comparison)])
@@ -359,6 +361,13 @@ def _single_rows(comparison: Comparison) -> Explanation:
         key, values = "rates at sign changes", {"rows": float(len(times)), "first": float(row)}
     mistake, before = BY_KEY[key], comparison.worst.max(axis=1).tolist()
     return Explanation((key,), mistake.sentence.format(**values), values, [0.0, 0.0], before, 0.0, 0.0, True)
+
+
+def _allow_shape(rows: Rows, recording: Recording) -> float:
+    """Return the departure from a rotation that digits and noise allow. One attitude does not show how many digits it has."""
+    R = rows.case.data[0]
+    least = SHAPE_OF_ONE if R is not None and np.ptp(R, axis=0).max() == 0 else SHAPE
+    return float(max(least, UNITS_OF_DIGITS * recording.digits[1], SIGMAS * rows.noise[0]))
 
 
 def _unclear(case: Compared) -> str:
