@@ -1,4 +1,4 @@
-"""What a recording is: rows, rate, gaps, sign changes, jitter, digits and noise; and what its motion does not show."""
+"""Descriptions of recordings: rows, rate, gaps, sign changes, jitter, digits, noise, and properties that no row shows."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class Survey:
 
 @dataclass(frozen=True)
 class Description:
-    """What a recording is.
+    """The description of a recording.
 
     Attributes
     ----------

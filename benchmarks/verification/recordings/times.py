@@ -9,7 +9,7 @@ from .names import SECONDS, parse, vocabulary
 from .quantities import other
 
 DATES = dict.fromkeys(("utcg", "utc", "txt", "text", "date", "iso", "iso8601", "tai", "gps", "tdb", "local", "local time"), 1.0)
-"""What times are called that are read as dates or in s, in the place of a unit."""
+"""Names of times that are dates or in s, in the place of a unit."""
 DAYS = frozenset(("julian", "jd", "mjd"))
 """Words of times in days."""
 FRACTIONS = {"nsec": 1e-9, "ns": 1e-9, "usec": 1e-6, "us": 1e-6, "msec": 1e-3, "ms": 1e-3}
