@@ -336,7 +336,7 @@ class Compared:
         return [lies_along(left, along) for left, along in self._left(R, w)]
 
     def _left(self, R: Array, w: Array) -> list[tuple[Array, Array]]:
-        """Return differences (n, 3) of attitudes and rates from a motion, each with the directions (n, 3) of errors of times."""
+        """Return differences (n, 3) of attitudes and rates from a motion, with the directions (n, 3) of errors of times."""
         a, b = (y if x is None else x for x, y in zip(self.data, (R, w), strict=True))
         left, moved = differ(R, w, a, b, self.scale), np.gradient(w, self.t, axis=0) if len(self.t) > 1 else 0 * w
         return [(left[:, :3], w), (left[:, 3:], moved)]

@@ -76,7 +76,7 @@ class Recording:
         return int(row) + 1 if self.numbers is None else int(self.numbers[row])
 
     def describe(self, noise: tuple[float, float]) -> Description:
-        """Return the description of the recording; `noise` is the deviation of one axis of attitudes, rad, and of rates, rad/s."""
+        """Return the description of the recording; `noise` is the deviation of one axis of attitudes, rad, and rates, rad/s."""
         surveyed = self.surveyed
         if surveyed is None:
             (survey := Survey()).add(self.t, np.empty((len(self.t), 0)))

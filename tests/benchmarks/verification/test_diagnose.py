@@ -8,9 +8,12 @@ import pytest
 import conservative as cv
 from conservative import registry
 from conservative.benchmarks.verification import explain as diagnose
+from conservative.benchmarks.verification.mistakes import BY_KEY
 from conservative.benchmarks.verification.mistakes.scenes import with_inertia
+from conservative.benchmarks.verification.recordings.comparison import prepare
 from conservative.benchmarks.verification.recordings.table import Recording
 from conservative.benchmarks.verification.recordings.verdict import verify_recording
+from conservative.benchmarks.verification.trials import compose
 
 from ...sampling import sampled
 from .made import FREE, HEAVY, START, T, exact, late, noisy, reordered, stepped, turned, without
@@ -127,6 +130,16 @@ def test_bodies_that_the_search_tries_give_no_warning():
         other = with_inertia(HEAVY, np.diag([1.0, 1.0, 5.0]))
     assert other.body.moments.tolist() == [1.0, 1.0, 5.0]
     assert np.array_equal(other.body.inertia, other.rename("again").body.inertia)
+
+
+def test_a_mistake_that_cannot_explain_the_first_rows_is_not_fitted():
+    case = prepare(HEAVY, Recording(T, late(HEAVY, 0.02), rows=len(T)), True, None).case
+    decided = {}
+    for key in ("time shift", "damping", "size of the field"):
+        trial = compose(BY_KEY[key])
+        numbers = np.array([number.start for number in trial.numbers])
+        decided[key] = case.may_explain(trial.build(case), numbers, np.full(len(numbers), 1e-6))
+    assert decided == {"time shift": True, "damping": False, "size of the field": False}
 
 
 def test_the_search_ends_after_a_number_of_trial_motions(monkeypatch):

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import conservative as cv
-from conservative.benchmarks.verification.compare import Compared, allow
+from conservative.benchmarks.verification.compare import Compared, allow, is_noise
 from conservative.benchmarks.verification.recordings import comparison, verdict
 from conservative.benchmarks.verification.recordings.table import Recording
 from conservative.references.exact.method import free_body
@@ -126,6 +126,37 @@ def test_noise_is_what_the_exact_motion_leaves_in_rows_at_any_distance(turn, fas
     t = np.arange(401) * turn / SCALE
     w = free_body(SCENE.body, SCENE.R_WB0, SCENE.w_WB_B0, faster * t)[1] + noise(0.01, len(t))
     assert (verify(None, w, t, SCENE.rename("long", t_end=float(t[-1]))).verdict == "right") == (expected == "right")
+
+
+def smoothed(x, width):
+    return np.stack([np.convolve(column, np.ones(width) / width**0.5, "same") for column in x.T], axis=1)
+
+
+NORMAL = np.random.default_rng(2).normal(size=(300, 3)) * 1e-3
+NOT_NOISE = {
+    "larger than a twentieth": 60 * NORMAL,
+    "of a mean": NORMAL + 5e-4,
+    "correlated": smoothed(NORMAL, 3),
+    "growing": NORMAL * np.linspace(0.2, 1.8, 300)[:, None],
+    "in a plane": NORMAL * [1.0, 1.0, 0.1],
+    "with a single row": NORMAL + 0.01 * (np.arange(300) == 99)[:, None],
+    "of a few rows": NORMAL[:13],
+}
+
+
+@pytest.mark.parametrize("kind", NOT_NOISE)
+def test_noise_is_small_white_of_one_size_and_in_all_directions(kind):
+    assert is_noise(NORMAL, W[:300])
+    assert not is_noise(NOT_NOISE[kind], W[: len(NOT_NOISE[kind])])
+
+
+def test_differences_along_a_motion_or_in_its_plane_are_no_noise():
+    """The motion turns in all directions, so that differences along it do, too."""
+    along = Rotation.from_rotvec(0.3 * np.cumsum(np.random.default_rng(4).normal(size=(300, 3)), axis=0)).apply([1.0, 0.0, 0.0])
+    inwards = np.gradient(along, axis=0)
+    inwards /= np.linalg.norm(inwards, axis=1, keepdims=True)
+    in_plane = NORMAL[:, :1] * along + NORMAL[:, 1:2] * inwards
+    assert [is_noise(left, along) for left in (NORMAL, NORMAL[:, :1] * along, in_plane)] == [True, False, False]
 
 
 @pytest.mark.parametrize(("size", "expected"), [(25.0, True), (36.0, False)])

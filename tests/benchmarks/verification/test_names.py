@@ -217,3 +217,23 @@ def test_a_motion_beside_the_mistakes_is_not_given_their_names(name):
 
 def test_all_names_are_in_the_catalogue():
     assert {name.removesuffix(", noise") for name in PLANTED} <= set(BY_KEY)
+
+
+def test_a_method_with_a_motor_takes_its_torque_at_the_start_of_a_step():
+    """The momentum of the motor has a corner within a step."""
+    times, values = [0.0, 2.51, 6.0], np.array([[0.3, -0.2, 0.4], [-0.5, 0.6, 0.1], [0.2, 0.1, -0.3]])
+    J, (R, w), rows, step = FREE.body.inertia, (FREE.R_WB0, FREE.w_WB_B0), [(FREE.R_WB0, FREE.w_WB_B0)], T[1] / 2
+    for number in range(2 * (len(T) - 1)):
+        t = number * step
+        k = int(t >= times[1])
+        change = (values[k + 1] - values[k]) / (times[k + 1] - times[k])
+        h = values[k] + change * (t - times[k])
+        w = w + step * np.linalg.solve(J, np.cross(J @ w + h, w) - change)  # rates first, then the attitude
+        R = R @ Rotation.from_rotvec(step * w).as_matrix()
+        rows += [(R, w)] * (number % 2)
+    scene = cv.Scene("wheel", cv.RigidBody(J, rotor_momentum=(times, values)), *START, 6.0)
+    found = verify_recording(scene, Recording(T, (np.array([R for R, _ in rows]), np.array([w for _, w in rows])), rows=len(T)))
+    expected = "semi-implicit Euler with an explicit gyroscopic term and the exponential map"
+    assert [each.keys for each in found.details.explaining] == [(expected,)]
+    assert found.details.explaining[0].values["step"] == pytest.approx(step)
+    assert max(found.details.explaining[0].left) < 1e-11
