@@ -38,7 +38,7 @@ from .find_steps import PARTS, STEPS_AT_MOST, Linearised, by_step, find_steps
 from .mistakes import BY_KEY
 from .mistakes.attitudes import DRIFTS, RULES, Drift, align, integrate
 from .mistakes.equations import EQUATIONS
-from .mistakes.habits import HABITS, HELD, PART_STANDSTILLS, ROWS, STANDSTILLS, Habit, Standstill
+from .mistakes.habits import HABITS, HELD, PART_STANDSTILLS, ROWS, STANDSTILLS, Habit, Standstill, any_values
 from .mistakes.mistake import Number
 from .mistakes.readings import ATTITUDES, AXES, RATES, READINGS, TURN, Reading
 from .mistakes.scenes import PARTS as SCENE_PARTS
@@ -765,15 +765,13 @@ def _rows(case: Compared, asked: _Asked) -> Explanations:
     for row in ROWS:
         if periodic if row.periodic else near:
             made: Any = row.change(case.exact, case.data, off)
-            if any(x is None for x in made):  # it is about rates, and the file has none
-                continue
             values = {"first": float(places[0] * case.stride + 1)}
             values |= {"period": float(gaps[0] * case.stride)} if row.periodic else {"rows": float(len(places))}
             yield explain(fine, Trial((row,), _nowhere), made, values, numbers=len(values) - (not row.periodic) + row.any)
     if not periodic and not near:
         worst = float(case.error[:, places[0]].max())
         values = {"row": float(places[0] * case.stride + 1), "time": float(case.t[places[0]]), "error": worst}
-        made = ROWS[-1].change(case.exact, case.data, off)
+        made = any_values(case.exact, case.data, off)
         # Rows with any values explain much: this ranks behind all explanations by fitted numbers.
         yield explain(fine, Trial((BY_KEY["single rows"],), _nowhere), made, values, numbers=9)
 

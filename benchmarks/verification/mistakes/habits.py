@@ -142,17 +142,23 @@ def _conjugated(right: States, data: States, off: Array) -> States:
 
 def _one_component(right: States, data: States, off: Array) -> States:
     """Return right samples, with the file's first component in all three components of the rates that are off."""
-    R, w = right[0], data[1]
-    return R, None if w is None else _change_off_rows((None, right[1]), off, lambda _: np.repeat(w[:, :1], 3, axis=1))[1]
+    w = data[1]
+    return right if w is None else (right[0], _where(off, np.repeat(w[:, :1], 3, axis=1), right[1]))
 
 
-def _unknown(right: States, data: States, off: Array) -> States:
-    """Return the data in rows that are off."""
-    R, w = (
-        None if x is None or y is None else np.where(off.reshape(-1, *(1,) * (x.ndim - 1)), y, x)
-        for x, y in zip(right, data, strict=True)
-    )
-    return R, w
+def any_values(right: States, data: States, off: Array) -> States:
+    """Return right samples, with the data in the rows that are off."""
+    return _where(off, data[0], right[0]), _where(off, data[1], right[1])
+
+
+def _any_rates(right: States, data: States, off: Array) -> States:
+    """Return right samples, with the rates of the data in the rows that are off."""
+    return right[0], _where(off, data[1], right[1])
+
+
+def _where(off: Array, x: Array | None, right: Array | None) -> Array | None:
+    """Return right samples, with those of `x`, if it has any, in the rows that are off."""
+    return right if x is None or right is None else np.where(off.reshape(-1, *(1,) * (x.ndim - 1)), x, right)
 
 
 HABITS = (
@@ -229,11 +235,11 @@ ROWS = (
         "One in {period:.0f} rows has one number in all components of the rates, from row {first:.0f} on",
         _one_component,
     ),
-    RowHabit("some rows", "One in {period:.0f} rows is off, from row {first:.0f} on; the others agree", _unknown, any=True),
+    RowHabit("some rows", "One in {period:.0f} rows is off, from row {first:.0f} on; the others agree", any_values, any=True),
     RowHabit(
         "rates at sign changes",
         "The rates are spoiled in {rows:.0f} rows in which the quaternion changes its sign, the first of them row {first:.0f}",
-        _unknown,
+        _any_rates,
         periodic=False,
         remedy="choose the sign of the quaternion before its difference is taken",
     ),

@@ -111,11 +111,26 @@ def test_a_sensor_at_rest_shows_noise_and_no_motion(tmp_path):
         assert_verdict(verify(tmp_path, of, table), "undecided")
 
 
-@pytest.mark.parametrize("make", [columns, lambda of: zero(columns(of))], ids=["motion", "zeros"])
-def test_one_row_is_off(make, tmp_path):
-    found = verify(tmp_path, MOVING, one_row_moved(make(MOVING)))
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("make", [columns, lambda of, kind: zero(columns(of, kind=kind))], ids=["motion", "zeros"])
+def test_one_row_is_off(make, kind, tmp_path):
+    found = verify(tmp_path, MOVING, one_row_moved(make(MOVING, kind=kind)))
+    if make is not columns and kind == "attitudes":  # two mistakes: without rates, the attitudes should move
+        assert_verdict(found, "wrong")
+        return
     assert_verdict(found, "wrong", "single rows")
     assert found.findings[0].causes[0].numbers["row"] == 61
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_fifth_row_is_off(kind, tmp_path):
+    random = np.random.default_rng(7)
+    table = changed(
+        columns(MOVING, kind=kind), lambda name, x: x + 0.01 * random.normal(size=len(x)) * (np.arange(len(x)) % 5 == 2)
+    )
+    found = verify(tmp_path, MOVING, table)
+    assert_verdict(found, "wrong", "some rows")
+    assert (found.findings[0].causes[0].numbers["first"], found.findings[0].causes[0].numbers["period"]) == (3, 5)
 
 
 @pytest.mark.parametrize("rows", [2, 3])
