@@ -55,6 +55,8 @@ ROWS_OF_EFFORT = 500
 """Number of rows whose comparison takes as long as a stretch of a motion."""
 PERTURBED = 1e-8, 1e-12
 """Changes of initial states that show how the motion multiplies them. The second is used where the first becomes large."""
+FEWEST_FIT = 4
+"""Rows that a fit of the start begins with, if the body turns by more than a quarter from row to row."""
 STRAIGHT, NARROWED = 0.03, 6
 """Largest difference of motions from which slopes are computed, and the number of trials with smaller changes."""
 QUARTER = math.pi / 2
@@ -392,7 +394,8 @@ class Compared:
         # More and more rows: a motion that multiplies small changes is not linear in its start over all rows.
         noise = np.where(self.open, HOPELESS * MOST_NOISE, 0.0)
         most_left = max(HOPELESS, float((np.maximum(self.allowed, noise) / self.noise).max()))
-        rows = [n] if not free else [k for k in (n // 64, n // 16, n // 4) if k >= 8] + [n]
+        first = [FEWEST_FIT] if self.gap > QUARTER and n > 2 * FEWEST_FIT else []  # noise in the start grows with each turn
+        rows = [*first, *(k for k in (n // 64, n // 16, n // 4) if k >= 8), n] if free else [n]
         for k in rows if moved else ():
             if self.take(slice(0, k)).work(len(moved)) > self.effort.left:
                 break
