@@ -305,7 +305,7 @@ def test_an_error_is_a_plain_number_with_its_unit(unit, error, text):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_noise_in_rows_between_which_the_body_turns_three_times(seed):
-    """18 rad from row to row and noise of 1e-2. Fits that began with 10 rows failed in 12 of 16 such files, with 4 rows in none."""
+    """18 rad from row to row. Fits that began with 10 rows failed in 12 of 16 such files, with 4 rows in none."""
     t, random = 9.0 * np.arange(41), np.random.default_rng(seed)
     scene = cv.Scene("fast", BODY, *START, 400.0)
     R, w = free_body(BODY, scene.R_WB0, scene.w_WB_B0, t)
