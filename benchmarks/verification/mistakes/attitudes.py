@@ -120,7 +120,10 @@ def _rule(update: str, rates: str, world: bool) -> Rule:
         made = matrices(choose(a, b), h)
         return _other_side(made) if world else made
 
-    return Rule(key, text, effect, world, numbers=(Number("step", unit="s"),))
+    remedy = "turn by the exponential map, by the mean of the rates of both ends"
+    if world:
+        remedy = "q' = q w / 2 with rates in body axes"
+    return Rule(key, text, effect, world, numbers=(Number("step", unit="s"),), remedy=remedy)
 
 
 RULES = tuple(

@@ -82,6 +82,7 @@ EQUATIONS = (
         "R I for R I R'",
         "The inertia in world axes is R I instead of R I R'",
         lambda scene: Equations(scene, half_turned=True),
+        remedy="the inertia in world axes is R J R'",
     ),
     EquationsMistake(
         "wrong side",
@@ -100,6 +101,7 @@ EQUATIONS = (
         "The attitudes turn by {factor:.3f} times the rates",
         lambda scene, factor: Equations(scene, turn=factor),
         numbers=(Number("factor", 1.0),),
+        remedy="q' = q w / 2",
     ),
     EquationsMistake(
         "damping",
@@ -112,10 +114,12 @@ EQUATIONS = (
         "no reaction of the motor",
         "The reaction of the motor is missing: J w' = (J w + h) x w without - h'",
         lambda scene: Equations(scene, reaction=0.0) if scene.body.motor else None,
+        remedy="J w' = (J w + h) x w - h'",
     ),
     EquationsMistake(
         "sign of the reaction of the motor",
         "The reaction of the motor has the other sign: J w' = (J w + h) x w + h'",
         lambda scene: Equations(scene, reaction=-1.0) if scene.body.motor else None,
+        remedy="J w' = (J w + h) x w - h'",
     ),
 )

@@ -184,6 +184,7 @@ HABITS = (
         lambda w, band: np.where(np.abs(w) < band, 0.0, w),
         _guess_band,
         numbers=(Number("band", unit="rad/s"),),
+        remedy="turn off the dead band",
     ),
 )
 STANDSTILLS = (
@@ -199,8 +200,15 @@ STANDSTILLS = (
         "The motion halts: attitude and rates are constant from {time:.6g} s on",
         1.0,
         numbers=(Number("time", unit="s"),),
+        remedy="take the steps until the last sample",
     ),
-    Standstill("frozen motion", "The motion is frozen: attitude and rates stay as at the start", 1.0, True),
+    Standstill(
+        "frozen motion",
+        "The motion is frozen: attitude and rates stay as at the start",
+        1.0,
+        True,
+        remedy="take the steps, and make the body dynamic",
+    ),
 )
 PART_STANDSTILLS = tuple(
     Standstill(

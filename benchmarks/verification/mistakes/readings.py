@@ -167,7 +167,10 @@ READINGS = (
         remedy="answer in rad/s",
     ),
     Reading("rates in radians", "The rates are in rad/s, but were read in deg/s", *_scaled(180 / math.pi), RATES),
-    Reading("reversed rates", "The rates have the other sign", *_scaled(-1.0), RATES),
+    Reading(
+        "reversed rates", "The rates have the other sign", *_scaled(-1.0), RATES,
+        remedy="answer w with R' = R [w]x in body axes",
+    ),
     Reading(
         "size of the rates",
         "The attitudes are right, but the rates are {factor:.5g} times too large",

@@ -161,34 +161,71 @@ PARTS = tuple(
 FACTOR = (Number("factor", 1.0),)
 SIZES = (
     *(
-        SceneMistake(f"size of {name}", f"{text} is {{factor:.5g}} times the scene's", change, numbers=FACTOR)
+        SceneMistake(
+            f"size of {name}",
+            f"{text} is {{factor:.5g}} times the scene's",
+            change,
+            numbers=FACTOR,
+            remedy=f"check the units of {name}, SI",
+        )
         for name, text, change in (
             ("the rotor", "The wheel's momentum", _rotor),
             ("the torque", "The torque", _torque),
             ("the damping", "The damping", _damping),
         )
     ),
-    SceneMistake("rate of the orbit", "The rate of the orbit is {factor:.8g} times the scene's", _orbit, numbers=FACTOR),
+    SceneMistake(
+        "rate of the orbit",
+        "The rate of the orbit is {factor:.8g} times the scene's",
+        _orbit,
+        numbers=FACTOR,
+        remedy="check the unit of the rate, rad/s",
+    ),
 )
 SCENES = (
     *PARTS,
     *SIZES,
-    SceneMistake("sign of the rotor", "The momentum of the rotor has the other sign", partial(_rotor, factor=-1.0)),
+    SceneMistake(
+        "sign of the rotor",
+        "The momentum of the rotor has the other sign",
+        partial(_rotor, factor=-1.0),
+        remedy="the momentum is J w + h",
+    ),
     SceneMistake(
         "turning of the field",
         "The field does not turn",
         lambda scene: changed(scene, potential=static_part(scene.potential)),
+        remedy="turn the field with the orbit at each time",
     ),
-    SceneMistake("sign of the torque", "The torque has the other sign", partial(_torque, factor=-1.0)),
+    SceneMistake(
+        "sign of the torque",
+        "The torque has the other sign",
+        partial(_torque, factor=-1.0),
+        remedy="J w' = (J w) x w + T",
+    ),
     SceneMistake(
         "axes of the torque",
         "The components of the torque are taken in the other axes, world instead of body or the reverse",
         _turn_torque,
+        remedy="T_B = R' T_W",
     ),
-    SceneMistake("sign of the damping", "The damping has the other sign", partial(_damping, factor=-1.0)),
-    SceneMistake("no products of inertia", "The products of inertia are dropped", partial(_products, factor=0.0)),
     SceneMistake(
-        "sign of the products of inertia", "The products of inertia have the other sign", partial(_products, factor=-1.0)
+        "sign of the damping",
+        "The damping has the other sign",
+        partial(_damping, factor=-1.0),
+        remedy="J w' = (J w) x w - D w",
+    ),
+    SceneMistake(
+        "no products of inertia",
+        "The products of inertia are dropped",
+        partial(_products, factor=0.0),
+        remedy="use the whole tensor, or principal axes",
+    ),
+    SceneMistake(
+        "sign of the products of inertia",
+        "The products of inertia have the other sign",
+        partial(_products, factor=-1.0),
+        remedy="the matrix has minus the sums of m x y beside the diagonal",
     ),
     SceneMistake(
         "inverted inertia", "The inertia is inverted: J w' = (J w) x w with the inverse of J", _inverted,
@@ -208,7 +245,10 @@ SCENES = (
         remedy="`moments` are about the fixed point",
     ),
     SceneMistake(
-        "smallest moments", f"Moments of inertia below {SMALLEST:g} kg m^2 are replaced by {SMALLEST:g} kg m^2", _smallest
+        "smallest moments",
+        f"Moments of inertia below {SMALLEST:g} kg m^2 are replaced by {SMALLEST:g} kg m^2",
+        _smallest,
+        remedy="lower the least moment of the engine, or scale the units of mass or length",
     ),
     SceneMistake(
         "start in order xyzw",

@@ -53,6 +53,12 @@ def names() -> dict[str, str]:
     return sentences | {_BOTH: f"{sentences[BOTH[0]]}. {sentences[f'{BOTH[1]} {BOTH[2]:g}']}"}
 
 
+def remedies() -> dict[str, str]:
+    """Return what the author of a program changes, by the names in the files."""
+    changes = {name: mistake.remedy for name, mistake, _ in _all()}
+    return changes | {_BOTH: f"{changes[BOTH[0]]}; {changes[f'{BOTH[1]} {BOTH[2]:g}']}"}
+
+
 def _all() -> Iterator[tuple[str, Mistake, tuple[float, ...]]]:
     """Yield the name of each signature, its mistake and the numbers of the mistake."""
     for key, mistake in BY_KEY.items():
