@@ -15,6 +15,7 @@ from conservative.benchmarks.verification.explanation import attempt
 from conservative.benchmarks.verification.mistakes import BY_KEY, habits, table_of
 from conservative.benchmarks.verification.mistakes.readings import READINGS, Reading
 from conservative.benchmarks.verification.motions.motion import load
+from conservative.benchmarks.verification.motions.signatures import remedies
 from conservative.benchmarks.verification.trials import compose
 from conservative.references.exact.method import free_body
 
@@ -178,6 +179,10 @@ def test_a_mistake_that_is_applied_leaves_nothing(name, key):
 def test_a_key_is_there_once():
     with pytest.raises(ValueError, match="'transposed' twice"):
         table_of([*BY_KEY.values(), BY_KEY["transposed"]])
+
+
+def test_each_mistake_that_a_program_shows_has_a_remedy():
+    assert [name for name, remedy in remedies().items() if not remedy] == []
 
 
 def test_a_named_mistake_explains_another_motion_with_the_same_number():
