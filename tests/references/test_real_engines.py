@@ -6,6 +6,7 @@ DART, MJX and PyBullet 3.58e-3 rad at dt = 0.01, RK4 of MuJoCo and Exudyn 4.31e-
 """
 
 import numpy as np
+import psutil
 import pytest
 
 import conservative as cv
@@ -232,6 +233,20 @@ def test_an_engine_whose_package_the_system_does_not_have():
         Apt().resolve(Distribution("libnone-dev", "none"), "", Source())
     with pytest.raises(BadInput, match="the version of the system"):
         Apt().resolve(registry.engine("ode").data, "0.0.1", Source())
+
+
+@pytest.mark.engine("pybullet")
+def test_scenes_of_pybullet_share_one_world():
+    """A verification prepares some hundred scenes: with a client for each it took 13 GB."""
+    environment = install("pybullet", BUILT).environment
+    method = registry.method(f"pybullet@{environment.version}:multibody")
+    used = []
+    for _ in range(2):
+        for _ in range(10):
+            method.prepare(SCENE, grid_for(SCENE, 0.01))()
+        process = worker_of(environment)._process
+        used.append(psutil.Process(process.pid).memory_info().rss)
+    assert used[1] - used[0] < 2**23  # measured: 0.3 MB; 10 clients take 280 MB
 
 
 @pytest.mark.engine("jsbsim")
