@@ -9,7 +9,8 @@ import yaml
 from ...environments import PATIENCE, ROOT
 from .test_versions import commit
 
-ACTION = yaml.safe_load((ROOT / ".github" / "actions" / "gate" / "action.yml").read_text())
+FOLDER = ROOT / ".github" / "actions" / "gate"
+ACTION = yaml.safe_load((FOLDER / "action.yml").read_text())
 COMPARE = next(step["run"] for step in ACTION["runs"]["steps"] if step.get("id") == "compare")
 NOTHING = "0" * 40
 
@@ -32,7 +33,7 @@ def act(tmp_path):
         command.chmod(0o755)
         files = {name: str(runner / name) for name in ("GITHUB_OUTPUT", "GITHUB_STEP_SUMMARY")}
         given = {"AGAINST": commits[against] if isinstance(against, int) else against, "PROJECT": ".", "ARGUMENTS": "--a b"}
-        given["TRACK"] = track
+        given |= {"TRACK": track, "PUSHED": "", "GITHUB_ACTION_PATH": str(FOLDER)}
         environment = {**os.environ, **files, **given, "RUNNER_TEMP": str(runner)}
         shell = ["bash", "-e", "-o", "pipefail", "-c", COMPARE]
         done = subprocess.run(shell, cwd=clone, env=environment, timeout=PATIENCE, check=False)
