@@ -176,7 +176,7 @@ class Amplification:
         return self.steepness > FASTER_THAN_LINEAR
 
     def excess(self, start: float, stop: float) -> float:
-        """Return the growth between two times, s, divided by that in proportion to time; infinite if an unstable motion ends before `stop`."""
+        """Return the growth between two times, s, relative to one in proportion to time; infinite if an unstable one ends."""
         end = float(self.t[-1])
         if self.ends and self.unstable and end < stop:
             return math.inf

@@ -75,7 +75,8 @@ class Probe:
     length, error
         Length of the run, s, and its largest attitude error, rad; nan if it failed.
     expected, law
-        Expected largest error over the whole duration, rad (infinite if it cannot be extrapolated), and how it was found, in words.
+        Expected largest error over the whole duration, rad (infinite if it cannot be extrapolated), and how it was found, in
+        words.
     holds
         Time, s, up to which the error is expected to stay within the requested one.
     error_law

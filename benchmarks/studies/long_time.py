@@ -47,7 +47,7 @@ KINDS = {0.25: "bounded", 0.75: "random walk", 1.5: "linear", math.inf: "quadrat
 
 
 def exponent(t: Array, error: Array) -> float:
-    """Return the slope of log(error) over log(t), each (n,), over the last two decades before the error is `SATURATED`, or NaN."""
+    """Return the slope of log(error) over log(t), each (n,), over the two decades before the error is `SATURATED`, or NaN."""
     t, error = (values[(error > 0) & (error < SATURATED)] for values in (t, error))
     if len(t) < PER_DECADE:
         return math.nan

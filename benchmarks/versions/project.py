@@ -52,8 +52,8 @@ TIME, MOTION = "time of a step", "another motion"
 OF_ATTITUDE = {measure.text for measure in (Measure.ATTITUDE_MAX, Measure.RATES_MAX, Measure.POSITION_MAX, Measure.ORDER)}
 """Measures that mean nothing if the attitude is lost."""
 FOLLOWED, SATURATED = 0.1, 3.0
-"""Attitude errors, rad: a motion with an error up to the first follows the exact one, and is another motion if it is lost in the
-later version; above the second in both versions, half a turn, errors say nothing."""
+"""Attitude errors, rad: a motion with an error up to the first follows the exact one, and is another motion if it is lost in
+the later version; above the second in both versions, half a turn, errors say nothing."""
 ANOTHER_SCENE = Outcome(OutcomeKind.OK, "the scene is another one")
 """Outcome of a row that was not measured, because its scene has another definition than in this process."""
 SLOW = 1.0
@@ -390,12 +390,12 @@ def _notes(line: ProjectLine, was: Row | None, now: Row | None) -> Iterator[str]
 
 def faster(line: ProjectLine) -> bool:
     """Return whether a row is faster than before. A motion whose attitude is lost is not."""
-    now = line.results[-1]
-    return bool(line.times and now) and not is_lost(error_of(now)) and line.times.first.direction() < 0
+    now, times = line.results[-1], line.times
+    return now is not None and times is not None and not is_lost(error_of(now)) and times.first.direction() < 0
 
 
 def improved(line: ProjectLine) -> tuple[str, ...]:
-    """Return what is better than before, by as much as it may get worse: its measures, and the outcome or the mistake if they are."""
+    """Return what is better than before by as much as it may get worse: measures, the outcome ("row") or the "mistake"."""
     was, now = line.results
     if was is None or now is None or not now.outcome.ok or was.definition != now.definition:
         return ()

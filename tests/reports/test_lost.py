@@ -1,7 +1,7 @@
-"""An attitude is lost above 1 rad, wherever it is said: in the gate, between two versions of a project or an engine, in `recommend`.
+"""An attitude is lost above 1 rad, wherever it is said: by the gate, `track`, and `recommend`.
 
-0.12 rad was called lost in both versions, and 0.2 rad by `recommend`. 0.46 rad that became 1.26 rad by a planted mistake next to a
-separatrix was called the same, because five times a spread of 0.16 rad allows it.
+0.12 rad was called lost in both versions, and 0.2 rad by `recommend`. 0.46 rad that became 1.26 rad by a planted mistake next
+to a separatrix was called the same, because five times a spread of 0.16 rad allows it.
 """
 
 from dataclasses import replace
@@ -17,8 +17,8 @@ from conservative.benchmarks.recommendation.probe import Probe
 from conservative.benchmarks.versions.changes import Aspect, find_changes
 from conservative.benchmarks.versions.project import Standing, decide, faster, standing_of
 from conservative.outcome import OK
-from conservative.reports.sections.recommendation import expected_text
 from conservative.registry import method
+from conservative.reports.sections.recommendation import expected_text
 
 from ..benchmarks.versions.made_up import comparison, row, timed
 from ..benchmarks.versions.made_up_engine import GOOD, near

@@ -1,7 +1,7 @@
-"""The scripts of the action that runs the one file of exact motions: with a repository, a made-up test in bash, and a made-up `gh`.
+"""The scripts of the action that runs the one file of exact motions, with a made-up repository, test and `gh`.
 
-The made-up test keeps the rules of the real ones: it writes its errors into ROTATION_RECORD, accepts those of ROTATION_KNOWN or of
-known.txt beside it, refuses other settings, and prints the sentence if something changed.
+The made-up test keeps the rules of the real ones: it writes its errors into ROTATION_RECORD, accepts those of ROTATION_KNOWN or
+of known.txt beside it, refuses other settings, and prints the sentence if something changed.
 """
 
 import os
@@ -34,8 +34,9 @@ fi
 
 
 def write(folder, error, step="1", alone=0):
-    """Write a version of the test; "broken" does not run."""
-    (folder / "test.sh").write_text("exit 7\n" if error == "broken" else TEST.format(error=error, step=step, alone=alone))
+    """Write a version of the test."""
+    texts = {"broken": "exit 7\n", "older": "exit 0\n"}  # which does not build, and which records nothing
+    (folder / "test.sh").write_text(texts.get(error) or TEST.format(error=error, step=step, alone=alone))
 
 
 class Done:
@@ -107,7 +108,7 @@ def test_without_a_base_its_parent_is_compared(act):
     assert act({"error": 20}, {"error": 23}, against="0" * 40).comment.startswith(SENTENCE.format(23))
 
 
-BASES = {"no test": None, "broken": {"error": "broken"}}
+BASES = {"no test": None, "broken": {"error": "broken"}, "older": {"error": "older"}}
 
 
 @pytest.mark.parametrize("base", BASES)
