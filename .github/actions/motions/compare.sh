@@ -92,6 +92,8 @@ if [ -n "$sentence" ]; then
   printf '%s\n\n%s.\n' "$sentence" "$of"
 elif [ "$status" != 0 ]; then
   printf 'Free rotation: no comparison, the command ends with exit status %s.\n\n%s.\n' "$status" "$of"
+elif [ -n "$why" ]; then
+  printf 'Free rotation: no comparison with the base.\n\n%s.\n' "$of"
 else
   printf 'Free rotation: no change.\n\n%s.\n' "$of"
 fi > "$OUT/comment.md"

@@ -137,6 +137,7 @@ def test_errors_at_other_steps_are_not_compared(act):
     done = act({"error": 20}, {"error": 23, "step": "2"})
     assert (done.status, done.only_edit) == (0, True)
     assert "settings of the test are not those of the base" in done.summary
+    assert "no change" not in done.comment
 
 
 def test_the_workspace_of_the_base_is_the_base(act):
