@@ -91,7 +91,7 @@ def test_citation_and_workflows_follow_their_schemas(tmp_path):
     for name, paths in {
         "citation-file-format": [ROOT / "CITATION.cff"],
         "github-workflows": [*(ROOT / ".github" / "workflows").glob("*.yml"), *(ROOT / "tests/example_package").glob("*.yml")],
-        "github-actions": [ROOT / ".github/actions/gate/action.yml"],
+        "github-actions": [*(ROOT / ".github" / "actions").glob("*/action.yml")],
     }.items():
         assert paths
         done = check_schema(name, *paths)

@@ -26,6 +26,7 @@ TEXTS = {field.name for kind in (Subject, Row, Finding, Cause) for field in fiel
 """Columns of rows, fields of findings, and other texts that are made for readers."""
 READS = {
     "benchmarks/gate/pytest_gate.py": "node ids of pytest",
+    "benchmarks/measures/origin.py": "the subject of a commit, which GitHub wrote",
     "benchmarks/verification/recordings/": "names of columns in the files of others",
     "benchmarks/versions/inside.py": "names of packages and methods, in a version that may have no parser of names",
     "reports/charts/style.py": "the order of a legend, in which numbers in names count as numbers",

@@ -102,7 +102,9 @@ def _row_violations(id: str, was: BaselineRow, results: Results) -> Iterator[Cha
             value = row.values.get(name, math.nan)
             if not (math.isfinite(value) and math.isfinite(allowed.limit)) or worsening(name, allowed, value) > 0:
                 side = "at least" if name == ORDER else "at most"
-                limit = f"{side} {allowed.limit:.6g} (spread {allowed.spread:.2g} in {allowed.runs} runs)"
+                limit = (
+                    f"{side} {allowed.limit:.6g} (spread {allowed.spread:.2g} in {allowed.runs} run{'s' * (allowed.runs != 1)})"
+                )
                 yield violation(name, allowed.value, row.values.get(name, MISSING), limit)
 
 

@@ -19,11 +19,18 @@ from .measure import Measure, Value
 
 CONSERVED, SMALL = 1e-10, 1e-3
 """Relative drift up to which a quantity is conserved, and up to which its drift is small."""
+LOST = 1.0
+"""Attitude error, rad, above which an attitude is lost."""
 
 FAR_SIDE = 0.5
 """Fraction of the initial momentum along the spin axis that the reversed momentum has to reach for a flip."""
 OF_TRUTH = ", loads of the truth"
 """Ends the name of the drift of a balance with the work or impulse of the truth."""
+
+
+def is_lost(error: float) -> bool:
+    """Return whether an attitude with this error, rad, is lost. Wherever "lost" is said of an attitude, this decides."""
+    return error > LOST
 
 
 def measure_errors(trajectory: Trajectory, truth: Trajectory) -> list[Value]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import re
 import subprocess
 from importlib import metadata
 from pathlib import Path
@@ -40,6 +41,18 @@ def git(folder: Path, *arguments: str) -> str:
     except (OSError, subprocess.SubprocessError):
         return ""
     return done.stdout.strip()
+
+
+def commit_title(folder: Path, commit: str) -> str:
+    """Return a short hash and the subject of a commit, as its author pushed it; "" without a commit.
+
+    GitHub tests a pull request as a commit that merges the pushed one into the base, and names both in its subject.
+    """
+    head, plus, changes = commit.partition("+")
+    subject = git(folder, "log", "-1", "--format=%s", head) if head else ""
+    if merge := re.fullmatch("Merge ([0-9a-f]{40}) into [0-9a-f]{40}", subject):
+        head, subject = merge[1], git(folder, "log", "-1", "--format=%s", merge[1])
+    return f"{head[:9]}{plus}{changes} {subject}".strip()
 
 
 def commit(folder: Path, mark_changes: bool = False) -> str:

@@ -13,7 +13,7 @@ from conservative.methods.trials import ASYMPTOTIC
 from conservative.number_text import number
 from conservative.trajectory import Trajectory
 
-from ..measures.errors import secular_slope
+from ..measures.errors import is_lost, secular_slope
 
 EQUAL = 1e-9
 """Times and steps that differ by less than this share are equal."""
@@ -82,7 +82,7 @@ class ErrorLaw:
     carried: str = ""
 
     def extrapolate(self, duration: float) -> float:
-        """Return the expected error over `duration` s, rad; infinite if the attitude is lost."""
+        """Return the expected error over `duration` s, rad; infinite if the error of the run is too large to extrapolate."""
         if self.error >= ASYMPTOTIC:
             return math.inf
         if self.is_measured(duration):
@@ -111,7 +111,7 @@ class ErrorLaw:
             return f"measured over all {duration:g} s"
         run = f"measured over {self.length:.3g} s{self.carried}"
         if self.error >= ASYMPTOTIC:
-            return f"{run}, where the attitude is lost"
+            return f"{run}, where {'the attitude is lost' if is_lost(self.error) else 'the error is too large to extrapolate'}"
         if math.isinf(self.excess):
             return f"{run}; cannot be extrapolated to {duration:g} s: the motion amplifies errors without bound"
         steady, growing = self.linear * duration, self.quadratic * duration**2
@@ -148,14 +148,14 @@ class Amplification:
     """Growth of a small relative change of the initial rates, the `disturbance`, as long as the two motions are comparable.
 
     `factor` (n,) is the largest difference of the attitudes up to the times t (n,), s, in rad, divided by the disturbance.
-    `label` belongs to the method that integrated both motions. If `is_lost`, the two motions are unrelated after t[-1].
+    `label` belongs to the method that integrated both motions. If `ends`, they are not comparable any more after t[-1].
     """
 
     t: Array
     factor: Array
     disturbance: float
     label: str
-    is_lost: bool = False
+    ends: bool = False
 
     @property
     def final_size(self) -> float:
@@ -176,9 +176,9 @@ class Amplification:
         return self.steepness > FASTER_THAN_LINEAR
 
     def excess(self, start: float, stop: float) -> float:
-        """Return the growth between two times, s, divided by that in proportion to time; infinite if the attitude is lost."""
+        """Return the growth between two times, s, relative to one in proportion to time; infinite if an unstable one ends."""
         end = float(self.t[-1])
-        if self.is_lost and self.unstable and end < stop:
+        if self.ends and self.unstable and end < stop:
             return math.inf
         last = min(stop, end)
         if last <= start:
@@ -189,6 +189,6 @@ class Amplification:
 
 def amplification_of(t: Array, factor: Array, disturbance: float, label: str) -> Amplification:
     """Return the amplification up to the time at which the two motions become unrelated."""
-    lost = factor * disturbance > ASYMPTOTIC
-    n = max(2, int(np.argmax(lost))) if lost.any() else len(t)
+    apart = factor * disturbance > ASYMPTOTIC
+    n = max(2, int(np.argmax(apart))) if apart.any() else len(t)
     return Amplification(t[:n], factor[:n], disturbance, label, n < len(t))

@@ -75,7 +75,8 @@ class Probe:
     length, error
         Length of the run, s, and its largest attitude error, rad; nan if it failed.
     expected, law
-        Expected largest error over the whole duration, rad (infinite if the attitude is lost), and how it was found, in words.
+        Expected largest error over the whole duration, rad (infinite if it cannot be extrapolated), and how it was found, in
+        words.
     holds
         Time, s, up to which the error is expected to stay within the requested one.
     error_law
@@ -284,7 +285,7 @@ class Conditions(Question):
         return replace(carried, linear=carried.linear + rounding)
 
     def shows_growth(self, probe: Probe) -> bool:
-        """Return whether a probe covered a whole short window without losing the attitude, so that it shows how errors grow."""
+        """Return whether a probe covered a whole short window with a small error, so that it shows how errors grow."""
         whole = probe.length >= min(self.short, self.duration) * (1 - EQUAL)
         return whole and probe.error_law is not None and not probe.error_law.carried and probe.error < ASYMPTOTIC
 

@@ -6,7 +6,7 @@ compiled methods reach a million turns and others fewer.
 
 An error is the largest so far: of the relative drift of an invariant, or of the attitude in rad if the motion has a closed
 form, which is accurate at any time. The growth p of an error ~ t^p is a fit over the last two decades of time before it is
-`LOST`: half is a random walk of round-off, 1 linear, 2 quadratic. Times of the lines are in turns.
+`SATURATED`: half is a random walk of round-off, 1 linear, 2 quadratic. Times of the lines are in turns.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ SAMPLES = 200
 PER_DECADE = 8
 LONGEST, TOTAL = 30.0, 200.0
 """Time budgets, s, of a run and of the study."""
-LOST = 0.5
+SATURATED = 0.5
 """Attitude error, rad, from which it grows no further."""
 ATTITUDE = "attitude"
 """Quantity of the attitude error, in addition to the invariants."""
@@ -47,8 +47,8 @@ KINDS = {0.25: "bounded", 0.75: "random walk", 1.5: "linear", math.inf: "quadrat
 
 
 def exponent(t: Array, error: Array) -> float:
-    """Return the slope of log(error) over log(t), each (n,), over the last two decades before the error is `LOST`, or NaN."""
-    t, error = (values[(error > 0) & (error < LOST)] for values in (t, error))
+    """Return the slope of log(error) over log(t), each (n,), over the two decades before the error is `SATURATED`, or NaN."""
+    t, error = (values[(error > 0) & (error < SATURATED)] for values in (t, error))
     if len(t) < PER_DECADE:
         return math.nan
     last = t >= t[-1] / 100

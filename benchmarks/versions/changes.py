@@ -14,7 +14,7 @@ from enum import StrEnum
 from functools import partial
 
 from ..measures.change import Change, Range, RowName, direction, exact
-from ..measures.errors import CONSERVED, SMALL
+from ..measures.errors import CONSERVED, LOST, SMALL
 from .engine import TIME_FACTOR, EngineComparison, Observation, StepTimes, ratio
 
 ORDER_STEP, ORDER_ERRORS = 0.5, 2.0
@@ -47,8 +47,10 @@ def find_changes(was: Observation, now: Observation, was_times: StepTimes, now_t
     if not was.outcome.ok:
         return ()
     changes, factor = [*_orders(was, now), *_drifts(was, now)], f"within a factor of {FACTOR:g}"
-    if max(was.error.value, now.error.value) > ROUND_OFF and resized(was.error, now.error):
-        changes.append(Change(row(Aspect.ERROR), was.error, now.error, factor, lost=False))
+    # An error of 0.46 rad cannot grow much more than fivefold, because angles end at pi: what counts is that 1.26 rad is lost.
+    crossed = int(was.error.high <= LOST < now.error.low) - int(now.error.high <= LOST < was.error.low)
+    if crossed or (max(was.error.value, now.error.value) > ROUND_OFF and resized(was.error, now.error)):
+        changes.append(Change(row(Aspect.ERROR), was.error, now.error, factor, lost=crossed > 0))
     if (times := ratio(was_times, now_times)).direction(TIME_FACTOR):
         limit = f"within a factor of {TIME_FACTOR:g}"
         changes.append(Change(row(Aspect.TIME), Range.of(was_times), times, limit, lost=False))

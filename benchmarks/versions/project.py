@@ -32,10 +32,11 @@ from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
 from ..gate import compare as gate
-from ..gate.baseline import COUNTS, update_baseline
-from ..gate.compare import Decision
+from ..gate.baseline import ATTITUDE, COUNTS, Allowed, limit, update_baseline
+from ..gate.compare import Decision, worsening
 from ..gate.results import Results, Row, find_runaway
 from ..measures.change import Change, RowName
+from ..measures.errors import is_lost
 from ..measures.measure import Measure
 from ..studies.selection import StandIn
 from ..studies.study import FindTruth, Progress, remember_truths
@@ -50,10 +51,9 @@ from .version import Checkout, Version
 TIME, MOTION = "time of a step", "another motion"
 OF_ATTITUDE = {measure.text for measure in (Measure.ATTITUDE_MAX, Measure.RATES_MAX, Measure.POSITION_MAX, Measure.ORDER)}
 """Measures that mean nothing if the attitude is lost."""
-ATTITUDE = Measure.ATTITUDE_MAX.text
-LOST, OTHER, FAR = 0.1, 1.0, 3.0
-"""Attitude errors, rad: above the first a motion is lost, and a shorter time is no gain; above the second it is another motion
-than one that was not lost; above the third in both versions, half a turn, errors say nothing."""
+FOLLOWED, SATURATED = 0.1, 3.0
+"""Attitude errors, rad: a motion with an error up to the first follows the exact one, and is another motion if it is lost in
+the later version; above the second in both versions, half a turn, errors say nothing."""
 ANOTHER_SCENE = Outcome(OutcomeKind.OK, "the scene is another one")
 """Outcome of a row that was not measured, because its scene has another definition than in this process."""
 SLOW = 1.0
@@ -71,6 +71,7 @@ class Standing(StrEnum):
     SLOWER = "slower"
     WORSE = "worse"
     PAID = "slower, accepted"
+    BETTER = "better"
     FASTER = "faster"
     NEW = "new"
     SAME = "same"
@@ -303,8 +304,8 @@ def decide(comparison: ProjectComparison, prices: Mapping[str, Price] = MappingP
     """Return the decision on the last step of a comparison: other motions, the gate's on values, and times without a price."""
     (base, head), steps = comparison.versions, list(comparison.steps)
     before = {was.id: was for _, was, _ in steps if was is not None and was.outcome.ok}
-    both_far = {now.id for _, was, now in steps if was and now and min(map(error_of, (was, now))) > FAR}
-    before |= {id: replace(before[id], values=_conserved(before[id])) for id in both_far & before.keys()}
+    saturated = {now.id for _, was, now in steps if was and now and _saturated(was, now)}
+    before |= {id: replace(before[id], values=_conserved(before[id])) for id in saturated & before.keys()}
     baseline = update_baseline(None, [Results("", before)], f"measured alongside {head.name}")
     decision = gate.decide(baseline, Results("", {now.id: now for _, _, now in steps if now is not None}))
     moved = {now.id: _moved(was, now) for _, was, now in steps if was and now and _moves(was, now)}
@@ -339,6 +340,11 @@ def error_of(row: Row) -> float:
     return row.values.get(ATTITUDE, 0.0)
 
 
+def _saturated(was: Row, now: Row) -> bool:
+    """Return whether attitudes are half a turn away in both versions, so that measures of them say nothing."""
+    return min(error_of(was), error_of(now)) > SATURATED
+
+
 def _conserved(row: Row) -> dict[str, float]:
     """Return the values of a row that mean something although its attitude is lost."""
     return {name: value for name, value in row.values.items() if name not in OF_ATTITUDE}
@@ -352,7 +358,7 @@ def _moves(was: Row, now: Row) -> bool:
         return False
     if now.mistake not in ("", was.mistake):  # also where the motion is lost in both
         return True
-    return was.outcome.ok and error_of(was) <= LOST < OTHER < error_of(now)
+    return was.outcome.ok and error_of(was) <= FOLLOWED and is_lost(error_of(now))
 
 
 def _moved(was: Row, now: Row) -> Change:
@@ -377,15 +383,35 @@ def _notes(line: ProjectLine, was: Row | None, now: Row | None) -> Iterator[str]
         yield f"{name}: looked slower ({time.first.value:.3f}), and was not when measured again ({time.again.value:.3f})"
     if faster(line) and time:
         yield f"{name}: faster, {time.first.value:.3f} of the time"
-    if was and now and min(error_of(was), error_of(now)) > LOST:
-        yield f"{name}: the attitude is lost in both versions: was {error_of(was):.3g} rad off, is {error_of(now):.3g} rad"
+    if was and now and is_lost(error_of(was)) and is_lost(error_of(now)):
+        errors = f"the error was {error_of(was):.3g} rad and is {error_of(now):.3g} rad"
+        yield f"{name}: the attitude is lost in both versions: {errors}"
 
 
 def faster(line: ProjectLine) -> bool:
-    """Return whether a row is faster than before. A motion that is lost is not."""
-    now = line.results[-1]
-    lost = now is None or error_of(now) > LOST
-    return line.times is not None and not lost and line.times.first.direction() < 0
+    """Return whether a row is faster than before. A motion whose attitude is lost is not."""
+    now, times = line.results[-1], line.times
+    return now is not None and times is not None and not is_lost(error_of(now)) and times.first.direction() < 0
+
+
+def improved(line: ProjectLine) -> tuple[str, ...]:
+    """Return what is better than before by as much as it may get worse: measures, the outcome ("row") or the "mistake"."""
+    was, now = line.results
+    if was is None or now is None or not now.outcome.ok or was.definition != now.definition:
+        return ()
+    if not was.outcome.ok:
+        return () if was.outcome.kind is OutcomeKind.UNSUPPORTED else ("row",)
+    better = [name for name in was.values if changed(was, now, name) < 0]
+    return (*["mistake"] * bool(was.mistake and not now.mistake), *better)
+
+
+def changed(was: Row, now: Row, measure: str) -> int:
+    """Return 1 if a measure is worse by more than the gate allows, -1 if it is better by as much, otherwise 0."""
+    if measure in OF_ATTITUDE and _saturated(was, now):
+        return 0
+    value, spread = was.values.get(measure, math.nan), was.spreads.get(measure, 0.0)
+    allowed = Allowed(value, spread, 1, limit(measure, value, spread))
+    return worsening(measure, allowed, now.values.get(measure, math.nan))
 
 
 def standing_of(line: ProjectLine, violations: Sequence[Change]) -> Standing:
@@ -397,9 +423,13 @@ def standing_of(line: ProjectLine, violations: Sequence[Change]) -> Standing:
         return Standing.MOTION if MOTION in measures else Standing.SLOWER if TIME in measures else Standing.WORSE
     if line.results[0] is None:
         return Standing.NEW
+    if line.times and line.times.failed:
+        return Standing.PAID
+    if improved(line):
+        return Standing.BETTER
     if line.times is None:
         return Standing.NOTHING
-    return Standing.PAID if line.times.failed else Standing.FASTER if faster(line) else Standing.SAME
+    return Standing.FASTER if faster(line) else Standing.SAME
 
 
 def _of_settings(steps: Sequence[tuple[ProjectLine, Row | None, Row | None]]) -> Iterator[str]:

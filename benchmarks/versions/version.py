@@ -21,7 +21,7 @@ from conservative.references.worker.calls import python_worker
 from conservative.references.worker.client import Worker
 from conservative.version import VERSION
 
-from ..measures.origin import commit, git
+from ..measures.origin import commit, commit_title, git
 
 _ALLOWED = "a git ref of the project's repository, a wheel, or a folder with pyproject.toml or setup.py"
 
@@ -31,17 +31,23 @@ class Version:
     """A version of a project or of an engine, and the environment in which it runs.
 
     `name` is the ref, the release, or the name of the folder or of the wheel. `commit` has "+changes" for a folder with changes
-    that are not committed, and is "" for a wheel or a release.
+    that are not committed, and is "" for a wheel or a release. `pushed` is its short hash and its subject.
     """
 
     name: str
     commit: str
     environment: Environment
+    pushed: str = ""
 
     @property
     def packages(self) -> tuple[str, ...]:
         """Installed packages, as `name==version` or the file of a wheel."""
         return tuple(text.rpartition("/")[2] for text in self.environment.packages)
+
+    @property
+    def headline(self) -> str:
+        """Name in headings: the commit of its author, if it has one."""
+        return self.pushed or self.title
 
     @property
     def title(self) -> str:
@@ -71,10 +77,12 @@ def install_version(name: str, project: Path, source: Source, requirements: Sequ
     if path.suffix == ".whl" and path.is_file():
         return Version(path.name, "", environment_of(keep_wheel("", lambda folder: path), requirements, source))
     if name and path.is_dir():
-        wheel = keep_wheel("", build_project(path, source))
-        return Version(path.resolve().name, commit(path, mark_changes=True), environment_of(wheel, requirements, source))
+        environment = environment_of(keep_wheel("", build_project(path, source)), requirements, source)
+        here = commit(path, mark_changes=True)
+        return Version(path.resolve().name, here, environment, commit_title(path, here))
     commit_hash = _find_commit(name, project)
-    return Version(name, commit_hash, environment_of(_wheel_of_commit(commit_hash, project, source), requirements, source))
+    environment = environment_of(_wheel_of_commit(commit_hash, project, source), requirements, source)
+    return Version(name, commit_hash, environment, commit_title(project, commit_hash))
 
 
 def _wheel_of_commit(commit_hash: str, project: Path, source: Source) -> Path:
@@ -143,4 +151,5 @@ def build_version(name: str, command: str, folder: Path) -> Version:
     if not (place / "conservative.toml").exists():  # a version from before the programs were registered
         shutil.copy(project_file(), place)
     environment = Checkout("conservative", VERSION, place, "", ())
-    return Version(name if key else place.name, key or commit(place, mark_changes=True), environment)
+    commit_hash = key or commit(place, mark_changes=True)
+    return Version(name if key else place.name, commit_hash, environment, commit_title(project, commit_hash))

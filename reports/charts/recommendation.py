@@ -59,7 +59,7 @@ def picture(recommendation: Recommendation) -> Any:
     if len(prices):
         rows.append(_costs(prices, families))
     title = f"{question.scene.name}: {question.error:g} rad over {question.duration:g} s"
-    subtitle = "marks: probe runs in their order; dashed: the error asked for; ringed: recommended; pi: lost"
+    subtitle = "marks: probe runs in their order; dashed: the error asked for; ringed: recommended; pi: no estimate"
     return apply_style(alt.vconcat(*rows, title=alt.Title(title, subtitle=subtitle)))
 
 

@@ -90,7 +90,11 @@ OF_VERSIONS = (
 @find_links_option
 @allow_build_option
 @click.option("--junit", type=Output('name="conservative gate"'), help="With --against: write a JUnit report.")
-@click.option("--markdown", type=Output("**gate: "), help="With --against: write verdict and table as Markdown.")
+@click.option(
+    "--markdown",
+    type=Output("**gate: "),
+    help="With --against: write what changed as Markdown, for a comment; everything else is folded.",
+)
 @click.option(
     "--html", type=Output("<title>conservative gate"), help="With --against: write a page with rows, ratios and filters."
 )

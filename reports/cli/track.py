@@ -32,7 +32,7 @@ PAGE = {"track.html": "<title>conservative track", "track.md": "# Versions of ",
 @click.command(
     cls=OutputCommand,
     short_help="Compare versions of an engine.",
-    codes={1: "with --against: an order, an invariant or the end of a run is lost"},
+    codes={1: "with --against: an order, an invariant, the attitude or the end of a run is lost"},
     epilog=epilog(
         "conservative track mujoco 3.6.0 3.7.0 4.0.0",
         "conservative track exudyn --last 3 --out exudyn_track",
@@ -48,8 +48,8 @@ PAGE = {"track.html": "<title>conservative track", "track.md": "# Versions of ",
     "--against",
     type=FilePath(),
     metavar="WHEEL|FOLDER",
-    help="Compare your own build with the last version. The exit code is 1 if it loses an order of convergence or an "
-    "invariant, or if a run fails that succeeded before.",
+    help="Compare your own build with the last version. The exit code is 1 if it loses an order of convergence, "
+    "an invariant or the attitude, or if a run fails that succeeded before.",
 )
 @click.option(
     "--bump", metavar="REF", help="Compare the versions in the lock or requirements files of a git ref and of this folder."
@@ -71,7 +71,8 @@ def track(engine: str, versions: tuple[str, ...], as_json: bool, **options: Any)
     """Run the same scenes and steps in each of the VERSIONS of an ENGINE, and show what changed from one to the next.
 
     ENGINE can contain the first version, as in mujoco@3.6.0. Versions without an environment are installed first, each in an
-    environment of its own. With --against, the exit code is 1 if an order, an invariant or the end of a run is lost.
+    environment of its own. With --against, the exit code is 1 if an order, an invariant, the attitude (an error above
+    1 rad) or the end of a run is lost.
     """
     require_extra("conservative track", "report")
     require_extra("conservative track", "environments")

@@ -26,18 +26,25 @@ def _escape_match(match: re.Match[str]) -> str:
 
 def render(document: Document, draw: Draw = _refuse) -> str:
     """Return a document as Markdown."""
+    if document.comment is not None:
+        return "\n\n".join(_blocks(document.comment, 2, draw, folds=True)) + "\n"
     return "\n\n".join([f"# {escape(document.title)}", *_blocks(document.blocks, 2, draw)]) + "\n"
 
 
-def _blocks(blocks: Iterable[Block], level: int, draw: Draw) -> Iterator[str]:
+def _blocks(blocks: Iterable[Block], level: int, draw: Draw, folds: bool = False) -> Iterator[str]:
+    """Yield the text of each block. With `folds`, folded sections are HTML, which GitHub and GitLab show in comments."""
     for block in blocks:
         match block:
             case Links():
                 yield ", ".join(f"[{escape(text)}]({file})" for text, file in block.links)
             case Section():
-                if content := list(_blocks(block.blocks, level + 1, draw)):  # a section of the page alone has none
-                    yield f"{'#' * level} {escape(block.title)}"
+                if content := list(_blocks(block.blocks, level + 1, draw, folds)):  # a section of the page alone has none
+                    folded = folds and block.folded
+                    title = escape(block.title)
+                    yield f"<details><summary>{title}</summary>" if folded else f"{'#' * level} {title}"
                     yield from content
+                    if folded:
+                        yield "</details>"
             case Paragraph():
                 text = escape(block.text)
                 yield f"**{text}**" if block.role is Emphasis.LEAD else text

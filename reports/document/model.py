@@ -257,6 +257,8 @@ class Document:
         Reasons why the command fails; empty if it succeeds.
     pages
         Documents next to this one, by the names of their files without an ending.
+    comment
+        Blocks that Markdown shows instead of title and blocks, for a pull request; None for all.
     for_paper
         A table that is also a file of its own, in LaTeX, or None.
     """
@@ -269,6 +271,7 @@ class Document:
     checks: Sequence[Check] = ()
     failures: Sequence[str] = ()
     pages: Mapping[str, Document] = field(default_factory=dict)
+    comment: Sequence[Block] | None = None
     for_paper: Table | None = None
 
     @property

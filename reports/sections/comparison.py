@@ -6,15 +6,18 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from conservative.benchmarks.gate.compare import Decision
 from conservative.benchmarks.gate.results import ENERGY_DRIFT
 from conservative.benchmarks.measures.change import Change
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.versions.prices import Price
 from conservative.benchmarks.versions.project import ProjectComparison, ProjectLine, Standing, decide, standing_of
+from conservative.benchmarks.versions.sentence import sentences
 from conservative.benchmarks.versions.times import CONFIDENCE, SLOWER, Ratio
 
 from ..document.cells import DASH, number, numeric
 from ..document.model import (
+    Block,
     Cell,
     Check,
     Document,
@@ -51,9 +54,11 @@ EXPLANATION = (
 )
 
 
+_FACTS = {"commit": "commit of conservative-rotation"}
+"""Names of facts about this process that readers would take for facts about the project."""
 _GRADES = {
     **dict.fromkeys((Standing.MOTION, Standing.SLOWER, Standing.WORSE), Grade.BAD),
-    **{Standing.PAID: Grade.FAIR, Standing.FASTER: Grade.GOOD, Standing.NOTHING: Grade.NONE},
+    **{Standing.PAID: Grade.FAIR, Standing.BETTER: Grade.GOOD, Standing.FASTER: Grade.GOOD, Standing.NOTHING: Grade.NONE},
 }
 
 
@@ -64,23 +69,28 @@ def build(
     versions, decided, made = comparison.versions, decide(comparison, prices or {}), made or {}
     findings = [change.finding for change in decided.violations]
     timed = sum(line.times is not None for line in comparison.lines)
-    rows, violations = len(comparison.lines), len(findings)
-    verdict = (
-        f"gate: {'passed' if decided.passed else 'FAILED'}, {rows} row{'s' * (rows != 1)}, {timed} timed, "
-        f"{violations} violation{'s' * (violations != 1)}"
-    )
+    rows, violations = _count(len(comparison.lines), "row"), _count(len(findings), "violation")
+    verdict = f"gate: {'passed' if decided.passed else 'FAILED'}, {rows}, {timed} timed, {violations}"
     # A check for each row, and one for each violation that belongs to no row.
     failed: dict[tuple[str, str], list[str]] = {(line.scene, line.setting): [] for line in comparison.lines}
     for change in decided.violations:
         failed.setdefault((change.row.scene, change.row.method), []).append(change.finding)
     packages = [(version.title, version.environment.runtime, ", ".join(version.packages)) for version in versions]
     explained = f"{EXPLANATION} The dashed line is the limit."
-    notes = Items.of(f"note: {note}" for note in decided.notes)
+    notes, said = Items.of(f"note: {note}" for note in decided.notes), sentences(comparison, decided)
+    details: list[Block] = filled(
+        Section("Notes", filled(notes)),
+        Section("Versions", [Table(("version", "runtime", "packages"), packages, "Packages of both versions")], folded=True),
+        Section("How this was made", [Facts([(_FACTS.get(name, name), fact) for name, fact in made.items()])], folded=True)
+        if made
+        else None,
+    )
     data = {
         "made": dict(made),
         "passed": decided.passed,
+        "sentences": said,
         "versions": {
-            when: {"name": version.name, "commit": version.commit, "packages": version.packages}
+            when: {"name": version.name, "commit": version.commit, "title": version.headline, "packages": version.packages}
             for when, version in zip(("was", "is"), versions, strict=True)
         },
         "violations": [change.texts for change in decided.violations],
@@ -89,31 +99,72 @@ def build(
     }
     return Document(
         "conservative gate",
-        f"{versions[1].title} against {versions[0].title}",
+        f"{versions[1].headline} against {versions[0].headline}",
         filled(
+            *map(Paragraph, said),
             Paragraph(verdict, Emphasis.LEAD),
             Section("Violations", filled(Items.of(findings))),
             Section("Rows", [Paragraph(explained), table(comparison, decided.violations)]),
-            Section("Notes", filled(notes)),
-            Section("Versions", [Table(("version", "runtime", "packages"), packages, "Packages of both versions")]),
-            Section("How this was made", [Facts(list(made.items()))]) if made else None,
+            *details,
         ),
-        brief=filled(Paragraph(verdict), Items.of(findings), notes),
+        brief=filled(*map(Paragraph, said), Paragraph(verdict), Items.of(findings), notes),
+        comment=_comment(comparison, decided, said, details),
         data=data,
         checks=[Check(*name, failure="\n".join(texts)) for name, texts in failed.items()],
         failures=findings,
     )
 
 
+def _comment(comparison: ProjectComparison, decided: Decision, said: Sequence[str], details: Sequence[Block]) -> list[Block]:
+    """Return the comment of a pull request: what changed, then everything else folded; one line if nothing changed."""
+    base, head = (_code(version.headline) for version in comparison.versions)
+    lines = comparison.lines
+    standings = {(line.scene, line.setting): standing_of(line, decided.violations) for line in lines}
+    news = [line for line in lines if standings[line.scene, line.setting] not in (Standing.SAME, Standing.NOTHING)]
+    rest = [line for line in lines if standings[line.scene, line.setting] in (Standing.SAME, Standing.NOTHING)]
+    of_no_row = [change.finding for change in decided.violations if (change.row.scene, change.row.method) not in standings]
+    verdict = "passed" if decided.passed else "FAILED"
+    if not news and not of_no_row:
+        text = f"gate: {verdict}, nothing changed in {_count(len(lines), 'row')}: {head} against {base}"
+        return [Paragraph(text, Emphasis.LEAD)]
+    changes = f"{len(news)} of {_count(len(lines), 'row')} changed, {_count(len(decided.violations), 'violation')}"
+    everything = filled(
+        Section("Violations", filled(Items.of(change.finding for change in decided.violations))),
+        Section("Unchanged rows", filled(_table(rest, decided.violations, ""))),
+        Section("Meaning of the columns", [Paragraph(EXPLANATION)]),
+        *details,
+    )
+    return filled(
+        *map(Paragraph, said),
+        Paragraph(f"gate: {verdict}, {changes}: {head} against {base}", Emphasis.LEAD),
+        Items.of(of_no_row),
+        _table(news, decided.violations, ""),
+        Section("Everything else", everything, folded=True),
+    )
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}{'s' * (number != 1)}"
+
+
+def _code(text: str) -> str:
+    """Return a text as code: the subject of a commit may contain mentions and tags."""
+    return f"`{text.replace('`', '')}`"
+
+
 def table(comparison: ProjectComparison, violations: Sequence[Change]) -> Table:
     """Return the rows: failed ones first, then by the change of time, largest first."""
-    standings = [(standing_of(line, violations), line) for line in comparison.lines]
+    return _table(comparison.lines, violations, "Rows")
+
+
+def _table(lines: Sequence[ProjectLine], violations: Sequence[Change], caption: str) -> Table:
+    standings = [(standing_of(line, violations), line) for line in lines]
 
     def rank(entry: tuple[Standing, ProjectLine]) -> tuple[int, float]:
         ratio = _ratio(entry[1])
         return list(Standing).index(entry[0]), -abs(math.log(ratio.value)) if ratio else 0.0
 
-    return Table(HEADER, [_row(line, standing) for standing, line in sorted(standings, key=rank)], "Rows", Style.FILTERED)
+    return Table(HEADER, [_row(line, standing) for standing, line in sorted(standings, key=rank)], caption, Style.FILTERED)
 
 
 def _row(line: ProjectLine, standing: Standing) -> Row:

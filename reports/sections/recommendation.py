@@ -7,12 +7,13 @@ import shlex
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from conservative.benchmarks.measures.errors import LOST, is_lost
 from conservative.benchmarks.recommendation.growth import ExpectedDrift
 from conservative.benchmarks.recommendation.probe import Probe
 from conservative.benchmarks.recommendation.recommend import PROBE_LIMIT, Advice, Recommendation
 from conservative.benchmarks.studies.selection import tolerance_setting
 
-from ..document.cells import angle, bound, number
+from ..document.cells import DASH, angle, bound, number
 from ..document.model import Block, Document, Emphasis, Items, Paragraph, Section, Table
 from ..rows.names import method_text, setting_text
 
@@ -54,7 +55,7 @@ def build(recommendation: Recommendation, scene: str, verbose: bool) -> Document
             "unstable": amplified.unstable,
             "disturbance": amplified.disturbance,
             "becomes": amplified.final_size,
-            "lost": amplified.is_lost,
+            "lost": amplified.ends,
             "measured_until": float(amplified.t[-1]),
             "by": amplified.label,
         },
@@ -124,7 +125,7 @@ def tables(recommendation: Recommendation) -> Iterator[Table]:
         if advice.reached:
             reaching.append((*names, angle(probe.expected), drift))
         else:
-            failing.append((*names, f"{number(probe.holds)} s", _expected(probe), drift))
+            failing.append((*names, f"{number(probe.holds)} s", expected_text(probe), drift))
     if reaching:
         yield Table(REACHING, reaching, "Settings that reach the error, fastest first")
     if failing:
@@ -143,7 +144,7 @@ def notes(recommendation: Recommendation) -> list[str]:
     """Return the fastest methods, and the basis of the numbers: growth of errors, reference solution, stability."""
     advice, conditions = recommendation.advice, recommendation.conditions
     truth, amplified = conditions.reference, conditions.amplification
-    after = ", and by any angle after that" if amplified.is_lost else ""
+    after = ", and by any angle after that" if amplified.ends else ""
     kinds = {"cheapest": "of all", "cheapest_general": "of our general integrators", "cheapest_engine": "of the engines"}
     winners = ((kinds[kind], method_text(winner) if winner else "none") for kind, winner in recommendation.winners.items())
     fastest = ", ".join(map(" ".join, winners))
@@ -151,7 +152,7 @@ def notes(recommendation: Recommendation) -> list[str]:
     return [
         f"Fastest: {fastest}.",
         *(f"{method_text(a)}: {a.best.law}." for a in advice if a.best),
-        f"conserved: relative drifts below {NEGLIGIBLE:g}; grows: steadily; lost: an error of π rad or more.",
+        f"conserved: relative drifts below {NEGLIGIBLE:g}; grows: steadily; lost: an attitude error above {LOST:g} rad.",
         f"Reference solution: {truth.names[0]}, which agrees with {truth.names[1]} to {bound(truth.agreement_rad)} rad over "
         f"the first {truth.checked_until:.3g} s; errors are measured over up to {conditions.truth_until:.4g} s.",
         f"A relative change of the initial rates by {amplified.disturbance:g} changes the attitude by up to "
@@ -169,11 +170,16 @@ def _probe_rows(advice: Advice) -> Iterator[tuple[str, ...]]:
         error = angle(probe.error, 3) if probe.outcome.ok else str(probe.outcome)
         name = (method_text(advice), order)[i] if i < 2 else ""
         setting = setting_text(probe) + (" <-" if probe is advice.best else "")
-        yield name, setting, f"{probe.length:.4g}", error, _expected(probe)
+        yield name, setting, f"{probe.length:.4g}", error, expected_text(probe)
 
 
-def _expected(probe: Probe) -> str:
-    return angle(probe.expected) if probe.expected < math.pi else "lost"
+def expected_text(probe: Probe) -> str:
+    """Return the expected error as text. An error that is too large to extrapolate is a lower limit."""
+    if not math.isinf(probe.expected):
+        return "lost" if is_lost(probe.expected) else angle(probe.expected)
+    if not probe.outcome.ok:
+        return DASH
+    return "lost" if is_lost(probe.error) else f"above {number(probe.error, 2)}"
 
 
 def drift_text(drifts: Sequence[ExpectedDrift]) -> str:

@@ -5,7 +5,7 @@ import pytest
 from llvmlite.binding import get_host_cpu_name
 
 from conservative.benchmarks.measures import origin
-from conservative.benchmarks.measures.origin import commit, machine, machine_title
+from conservative.benchmarks.measures.origin import commit, commit_title, machine, machine_title
 
 CPU = """processor\t: 0
 cpu family\t: 25
@@ -65,3 +65,24 @@ def test_commit(tmp_path):
     subprocess.run(["git", "-C", tmp_path, "add", "file"], check=True)
     assert commit(tmp_path, mark_changes=True) == f"{commit(tmp_path)}+changes"
     assert origin.git(tmp_path, "no-such-command") == ""
+
+
+def test_the_title_of_a_commit_is_the_one_that_was_pushed(tmp_path):
+    def git(*arguments):
+        who = ["-c", "user.name=a", "-c", "user.email=a@b"]
+        done = subprocess.run(["git", "-C", tmp_path, *who, *arguments], check=True, capture_output=True, text=True)
+        return done.stdout.strip()
+
+    git("init", "--quiet", "--initial-branch=main")
+    hashes = []
+    for text in ("First", "Turn faster"):
+        git("commit", "--quiet", "--allow-empty", "--message", text)
+        hashes.append(git("rev-parse", "HEAD"))
+    base, pushed = hashes
+    assert commit_title(tmp_path, base) == f"{base[:9]} First"
+    assert commit_title(tmp_path, f"{pushed}+changes") == f"{pushed[:9]}+changes Turn faster"
+    git("commit", "--quiet", "--allow-empty", "--message", f"Merge {pushed} into {base}")  # as GitHub tests a pull request
+    assert commit_title(tmp_path, git("rev-parse", "HEAD")) == f"{pushed[:9]} Turn faster"
+    git("commit", "--quiet", "--allow-empty", "--message", f"Merge {'1' * 40} into {base}")  # which was not fetched
+    assert commit_title(tmp_path, git("rev-parse", "HEAD")) == "1" * 9
+    assert commit_title(tmp_path, "") == commit_title(tmp_path / "nowhere", "") == ""

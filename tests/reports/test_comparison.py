@@ -19,7 +19,7 @@ from conservative.reports.document import text as text_of
 from conservative.reports.sections.comparison import EXPLANATION, build, table
 from conservative.reports.terminal import progress
 
-from ..benchmarks.versions.made_up import comparison, row, timed
+from ..benchmarks.versions.made_up import BASE, HEAD, comparison, row, timed
 from ..environments import ROOT
 
 SAME, SLOW, FAST = (1.0, 0.98, 1.02), (1.1, 1.08, 1.12), (0.8, 0.79, 0.81)
@@ -87,12 +87,12 @@ def test_json_has_measurements_and_null_for_missing_ones():
     (record,) = content["rows"]
     assert record["time"]["first"] == {"value": None, "low": None, "high": None, "processes": 7}
     assert record["is"]["values"]["steps"] == 600
-    assert content["versions"]["was"] == {"name": "was", "commit": "", "packages": ["numpy==2.0"]}
+    assert content["versions"]["was"] == {"name": "was", "commit": "", "title": "was", "packages": ["numpy==2.0"]}
 
 
 def test_markdown_and_junit_have_the_violations():
     text = text_of(SLOWER, "markdown")
-    assert text.startswith("# is against was\n\n**gate: FAILED")
+    assert text.startswith("**gate: FAILED")
     assert "| brick_flip | reduced | ✗ slower | 1.100 | 1.080 to 1.120 |" in text
     assert EXPLANATION in text
     suite = ElementTree.fromstring(text_of(SLOWER, "junit")).find("testsuite")
@@ -223,7 +223,7 @@ def test_a_file_of_somebody_else_is_not_replaced(gate, tmp_path, option):
 def test_the_action_and_the_workflow_use_options_that_there_are():
     known = {option for name in ("gate", "track") for parameter in main.commands[name].params for option in parameter.opts}
     for path in (".github/actions/gate/action.yml", "tests/example_package/pull_request.yml"):
-        text = re.sub(r"(?m)^.*\b(git|pip|gh|echo)\b.*$", "", (ROOT / path).read_text())
+        text = re.sub(r"(?m)^.*\b(git|pip|gh|echo|bash|more)\b.*$", "", (ROOT / path).read_text())
         used = set(re.findall(r"(?<= )--[a-z-]+", text))
         assert used
         assert used <= known, used - known
@@ -235,3 +235,82 @@ def test_a_row_of_another_motion_and_an_accepted_price_have_their_standing():
     moved = comparison((row(), lost, None))
     assert [str(cells[2]) for cells in table(moved, decide(moved).violations).rows] == [f"✗ {Standing.MOTION}"]
     assert [str(cells[2]) for cells in table(comparison(*slow), ()).rows] == [Standing.PAID]
+
+
+# ---------------------------------------------------------------------------------------------------------------- the comment
+
+COMMITS = {
+    "base": replace(BASE, commit="a" * 40, pushed="aaaaaaaaa First @team <b>`x`"),
+    "head": replace(HEAD, commit="b" * 40, pushed="bbbbbbbbb Turn faster"),
+}
+OURS = {"command": "conservative gate", "commit": "c" * 40}
+
+
+def comment(*lines):
+    return text_of(build(comparison(*lines, **COMMITS), OURS), "markdown")
+
+
+def unfolded(text):
+    return re.sub(r"(?s)<details>.*</details>", "", text)
+
+
+def test_a_comment_has_the_sentence_then_what_changed_and_everything_else_folded():
+    worse, same = row(attitude_error_max=2e-3), row(method="gauss")
+    text = comment((row(), worse, ON_TIME), (same, same, ON_TIME))
+    assert text.splitlines()[0] == (
+        "free rotation at your step, reduced: attitude error 0.001 to 0.002 rad; "
+        "first bad motion: brick_flip (no known mistake)"
+    )
+    shown = unfolded(text)
+    assert "1 of 2 rows changed" in shown
+    assert "| brick_flip | reduced | ✗ worse |" in shown
+    assert "gauss" not in shown
+    assert "| brick_flip | gauss | same |" in text
+    assert text.count("<details>") == text.count("</details>") == 3
+
+
+def test_a_comment_names_the_commits_of_the_user():
+    shown = unfolded(comment((row(), row(steps=601.0), ON_TIME)))
+    assert "`bbbbbbbbb Turn faster` against `aaaaaaaaa First @team <b>x`" in shown  # as code: no mention, no tag
+    assert not re.search("c{9}|a{10}|b{10}", shown)
+    assert "commit of conservative-rotation" in comment((row(), row(steps=601.0), ON_TIME))
+
+
+@pytest.mark.parametrize("time", [None, ON_TIME])
+def test_a_comment_without_a_change_is_one_line(time):
+    text = comment((GOOD, GOOD, time))
+    assert text.count("\n") == 1  # by which the action knows it
+    assert "nothing changed in 1 row: `bbbbbbbbb Turn faster` against" in text
+
+
+NEWS = {
+    "slower": ((GOOD, GOOD, timed(SLOW, SLOW)), False),
+    "faster": ((GOOD, GOOD, timed(FAST)), False),
+    "fewer steps": ((row(), row(steps=599.0), ON_TIME), False),
+    "better": ((row(), row(attitude_error_max=1e-4), ON_TIME), True),
+    "new": ((None, GOOD, None), False),
+    "mended": ((FAILED, GOOD, None), False),
+    "failed": ((GOOD, FAILED, None), True),
+    "gone": ((GOOD, None, None), False),
+}
+
+
+@pytest.mark.parametrize("name", NEWS)
+def test_what_changed_is_in_the_comment_and_only_accuracy_in_the_sentence(name):
+    line, accuracy = NEWS[name]
+    other = row(method="gauss")
+    text = comment(line, (other, other, ON_TIME))
+    assert "| brick_flip | reduced |" in unfolded(text)
+    assert text.startswith("free rotation at your step") == accuracy
+
+
+def test_a_violation_of_no_row_is_in_the_comment():
+    assert "rows" in unfolded(comment((None, GOOD, None)))
+
+
+def test_the_command_replaces_its_own_comment(gate, tmp_path):
+    path = tmp_path / "gate.md"
+    for measured in (answer(now=row(attitude_error_max=2.0)), answer(), answer(time=timed(SLOW, SLOW))):
+        gate("--against", "main", "--markdown", path, measured=measured)
+        assert "**gate: " in path.read_text()
+    assert path.read_text().startswith("**gate: FAILED")

@@ -311,8 +311,8 @@ def test_the_same_results_pass_and_values_at_their_limit():
 def test_a_violation_has_the_value_before_and_now_and_the_limit():
     verdict = compare.decide(KEPT, changed(values={"energy drift max": 2e-3, "observed order": 1.9}))
     assert [tuple(change.texts.values()) for change in verdict.violations] == [
-        ("energy drift max", "brick", "reduced", "0.001", "0.002", "at most 0.00105 (spread 1e-05 in 1 runs)"),
-        ("observed order", "brick", "reduced", "2", "1.9", "at least 1.95 (spread 0.001 in 1 runs)"),
+        ("energy drift max", "brick", "reduced", "0.001", "0.002", "at most 0.00105 (spread 1e-05 in 1 run)"),
+        ("observed order", "brick", "reduced", "2", "1.9", "at least 1.95 (spread 0.001 in 1 run)"),
     ]
     assert "| observed order | brick | reduced | 2 | 1.9 |" in verdict.markdown_text()
     assert "--update" in str(verdict)

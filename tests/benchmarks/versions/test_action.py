@@ -9,7 +9,8 @@ import yaml
 from ...environments import PATIENCE, ROOT
 from .test_versions import commit
 
-ACTION = yaml.safe_load((ROOT / ".github" / "actions" / "gate" / "action.yml").read_text())
+FOLDER = ROOT / ".github" / "actions" / "gate"
+ACTION = yaml.safe_load((FOLDER / "action.yml").read_text())
 COMPARE = next(step["run"] for step in ACTION["runs"]["steps"] if step.get("id") == "compare")
 NOTHING = "0" * 40
 
@@ -32,7 +33,7 @@ def act(tmp_path):
         command.chmod(0o755)
         files = {name: str(runner / name) for name in ("GITHUB_OUTPUT", "GITHUB_STEP_SUMMARY")}
         given = {"AGAINST": commits[against] if isinstance(against, int) else against, "PROJECT": ".", "ARGUMENTS": "--a b"}
-        given["TRACK"] = track
+        given |= {"TRACK": track, "PUSHED": "", "GITHUB_ACTION_PATH": str(FOLDER)}
         environment = {**os.environ, **files, **given, "RUNNER_TEMP": str(runner)}
         shell = ["bash", "-e", "-o", "pipefail", "-c", COMPARE]
         done = subprocess.run(shell, cwd=clone, env=environment, timeout=PATIENCE, check=False)
@@ -72,3 +73,30 @@ def test_engines_are_tracked_instead_of_methods(act):
     assert (code, base, summary) == (0, -3, "table\n")
     assert called[:3] == ["track", "mujoco", "--bump"]
     assert called[-2:] == ["--a", "b"]
+
+
+COMMENT = ACTION["runs"]["steps"][-1]["run"]
+
+
+@pytest.mark.parametrize(
+    ("text", "track", "name", "only_edit"),
+    [
+        ("sentence\n\ntable\n", "", "gate", False),
+        ("**gate: passed, nothing changed**\n", "", "gate", True),
+        (None, "", "gate", True),  # the comparison failed: an earlier comment must not stay
+        ("# Versions\n\ntable\n", "mujoco", "track gate", False),
+        (None, "mujoco", "track gate", True),  # no other version any more
+    ],
+)
+def test_a_comment_is_created_only_if_something_changed(tmp_path, text, track, name, only_edit):
+    (tmp_path / "gate").mkdir()
+    (tmp_path / "comment.sh").write_text(f'printf "%s\\n" "$@" > "{tmp_path}/said"; cat "$2" >> "{tmp_path}/said"\n')
+    if text is not None:
+        (tmp_path / "gate.md").write_text(text)
+    given = {"GITHUB_ACTION_PATH": str(tmp_path / "gate"), "RUNNER_TEMP": str(tmp_path), "TRACK": track, "PUSHED": "a" * 40}
+    shell = ["bash", "-e", "-o", "pipefail", "-c", COMMENT]
+    subprocess.run(shell, env={**os.environ, **given}, check=True, timeout=PATIENCE)
+    said = (tmp_path / "said").read_text()
+    assert said.startswith(f"{name}\n{tmp_path}/gate.md\n")
+    assert ("--only-edit" in said) == only_edit
+    assert said.endswith(text or f"No comparison of {'a' * 9}.\n")
