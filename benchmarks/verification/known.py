@@ -20,7 +20,7 @@ from __future__ import annotations
 import csv
 import math
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TextIO
@@ -29,6 +29,7 @@ from conservative import registry
 from conservative.errors import BadInput
 from conservative.files import read_bytes
 
+from ..measures.sentence import SAME_ERROR, SAME_ORDER, change_of
 from .finding import CHECKS, Finding, MotionFinding, Settings, Standing, Verdict, Verification
 
 HEAD = "# Known errors on exact motions. A later run fails if a motion is worse or has another mistake. Written by --record."
@@ -37,14 +38,12 @@ MARK = "# Known errors on exact motions."
 """The beginning of every file, by which files of others are recognized."""
 LARGEST = 1 << 24
 """Largest size of a file, bytes."""
-SHARE = 0.01
+SHARE = SAME_ERROR
 """Share of a recorded error that three digits and another machine may change."""
 ROUNDING = 1e-9
 """Allowed increase of an error if the same bits are expected: the size of rounding shows nothing."""
 RANDOM = 2.0
 """Factor of recorded errors that a subject may reach whose second run has other samples. Its mistake may be named or not."""
-SAME_ORDER = 0.2
-"""Difference of two measured orders of convergence that is not a change."""
 SKIPPED = "was tested, is skipped now: record again"
 UNKNOWN = "no known mistake"
 SEPARATOR = "; "
@@ -417,32 +416,21 @@ def _compare_order(finding: Finding, was: float) -> Finding:
 
 def _change(findings: Sequence[Finding], block: Block, subject: str) -> str:
     """Return the sentence for a pull request, "" if nothing changed that it says."""
-    parts = [*_changed_errors(findings, block), *_changed_order(findings, block)]
+    order = next((finding.error for finding in findings if finding.check == "order"), math.nan)
     first = next((finding for finding in findings if finding.check == "motions" and finding.standing is Standing.NEW), None)
-    sentence = ", ".join(parts)
+    first_bad = ""
     if first is not None:
         reason = SKIPPED if first.verdict is Verdict.NOT_TESTED else _named(_mistakes(first), first)
-        sentence += f"{'; ' * bool(parts)}first bad motion: {first.case} ({reason})"
-    return f"free rotation at your step{f' ({subject})' * bool(subject)}: {sentence}" if sentence else ""
+        first_bad = f"{first.case} ({reason})"
+    return change_of(_largest_errors(findings, block), (block.order, order), first_bad, subject)
 
 
-def _changed_errors(findings: Sequence[Finding], block: Block) -> Iterator[str]:
-    """Yield the largest attitude errors of free motions before and now, if they differ in two digits.
-
-    They can do so by the three digits of the file alone, such as 3.049 rad, which is 3.05 in the file and 3.1 here.
-    """
+def _largest_errors(findings: Sequence[Finding], block: Block) -> tuple[float, float]:
+    """Return the largest attitude errors of free motions, rad, before and now. Runs that ended early have none."""
     from .motions.motion import load  # here: recordings and model files need no motions
 
     free = {motion.name for motion in load() if not motion.features}
     before = [case.errors[0] for (check, name), case in block.cases.items() if check == "motions" and name in free]
     now = [finding.errors[0] for finding in findings if isinstance(finding, MotionFinding) and finding.case in free]
-    # Runs that ended early have no error.
     was, largest = (max(filter(math.isfinite, errors), default=math.nan) for errors in (before, now))
-    if abs(largest - was) > SHARE * was and f"{was:.2g}" != f"{largest:.2g}":  # False for nan
-        yield f"attitude error {was:.2g} to {largest:.2g} rad"
-
-
-def _changed_order(findings: Sequence[Finding], block: Block) -> Iterator[str]:
-    order = next((finding.error for finding in findings if finding.check == "order"), math.nan)
-    if abs(order - block.order) >= SAME_ORDER:  # False for nan
-        yield f"order {block.order:.1f} to {order:.1f}"
+    return was, largest

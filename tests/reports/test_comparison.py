@@ -258,7 +258,7 @@ def test_a_comment_has_the_sentence_then_what_changed_and_everything_else_folded
     worse, same = row(attitude_error_max=2e-3), row(method="gauss")
     text = comment((row(), worse, ON_TIME), (same, same, ON_TIME))
     assert text.splitlines()[0] == (
-        "free rotation at your step, reduced: attitude error 0.001 to 0.002 rad; "
+        "free rotation at your step (reduced): attitude error 0.001 to 0.002 rad; "
         "first bad motion: brick_flip (no known mistake)"
     )
     shown = unfolded(text)

@@ -81,4 +81,4 @@ def test_each_of_several_methods_has_its_name():
     worse = row(attitude_error_max=2e-3)
     compared = comparison((row(), worse, None), (row(method="gauss"), row(method="gauss"), None))
     (text,) = sentences(compared, decide(compared))
-    assert text.startswith(f"{SENTENCE}, reduced: attitude error 0.001 to 0.002 rad")
+    assert text.startswith(f"{SENTENCE} (reduced): attitude error 0.001 to 0.002 rad")
