@@ -50,6 +50,8 @@ ENGINE = {
 }
 
 ADAPTIVE = ("RKF45", "RKF78")
+MUJOCO_LEAST = 1e-15
+"""Smallest moment, kg m^2, that MuJoCo accepts (mjMINVAL)."""
 
 
 def prepare(given):
@@ -121,6 +123,8 @@ def _add_scene(given, simulation):
     """Add a scene of MuJoCo with a free body; return it and the message of the body's state."""
     if hasattr(given, "rotor"):
         raise NotImplementedError("a rotor needs a wheel of a spacecraft hub, which MJScene does not have: use RK4 or RKF78")
+    if given.moments_com.min() < MUJOCO_LEAST:
+        raise NotImplementedError("MuJoCo refuses a body without a moment, and MJScene crashes then")
     try:
         from Basilisk.simulation import mujoco
     except ImportError:
