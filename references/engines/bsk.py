@@ -1,8 +1,8 @@
-"""Basilisk's integrators on a free spacecraft hub, or on a body of MuJoCo (`MJScene`), in Basilisk's loop (`ExecuteSimulation`).
+"""Basilisk's integrators on a free spacecraft hub or on a body of its `MJScene`, in Basilisk's loop (`ExecuteSimulation`).
 
 A simulation cannot be started twice, so each run creates a new one, which is not timed. Attitudes are modified Rodrigues
-parameters. `MJScene` takes accelerations from MuJoCo and integrates them with Basilisk's integrators. By default it advances the
-quaternion by the mean rate of a step, which has order 2 and which no tolerance improves. Its option
+parameters. `MJScene` takes accelerations from MuJoCo and integrates them with Basilisk's integrators. By default it advances
+the quaternion by the mean rate of a step, which has order 2 and which no tolerance improves. Its option
 `highOrderAttitudeIntegration` gives the quaternion the order of the integrator.
 
 Parameters
