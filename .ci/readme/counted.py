@@ -54,8 +54,9 @@ def brick() -> str:
     """Return a sentence on the engines whose errors on the paper's brick are stored."""
     rows = read_csv(BRICK)
     lost = sum(float(row["error, rad"] or 0) > LOST for row in rows)
+    what = "the largest attitude error, the largest relative energy drift and the observed order"
     return (
-        "[brick.csv](engines/brick.csv) has the largest attitude error, the largest relative energy drift and the observed order\n"
+        f"[brick.csv](engines/brick.csv) has {what}\n"
         f"of {len(rows)} engines, as installed and with their best settings. "
         f"As installed, {lost} of them lose the attitude (more than 1 rad).\n"
     )

@@ -33,7 +33,7 @@ from .shared import FAR_MASS, FAR_PLACE, description_of, halves, record_warp, wr
 ORDERS = {
     **{"SemiImplicit": 1, "XPBD": 1, "Featherstone": 1, "VBD": 1, "Kamino": 1},
     **{"MuJoCo_euler": 1, "MuJoCo_implicitfast": 1, "MuJoCo_rk4": 4},
-    **{"MuJoCo_cpu_euler": 1, "MuJoCo_cpu_implicitfast": 1, "MuJoCo_cpu_rk4": 4},
+    **{"MuJoCo_cpu_euler": 1, "MuJoCo_cpu_implicitfast": 1, "MuJoCo_cpu_rk4": 2},
 }
 ENGINE = {
     "package": "newton[sim]",  # without the extra it lacks MuJoCo

@@ -84,7 +84,7 @@ ROWS = {
     ("newton", "MuJoCo_rk4"): (1.2e-2, 1.6e-4, 8.4e-5, None),
     ("newton", "MuJoCo_cpu_euler"): ENERGY_GROWS,
     ("newton", "MuJoCo_cpu_implicitfast"): ENERGY_DECAYS,
-    ("newton", "MuJoCo_cpu_rk4"): (1.7e-3, None, None, 2),
+    ("newton", "MuJoCo_cpu_rk4"): (1.7e-3, None, None, None),
     ("brax", "generalized"): ENERGY_GROWS,
     ("brax", "generalized,f32"): ENERGY_GROWS,
     ("brax", "positional"): (0.84, -0.6, 0.37, None),
@@ -359,6 +359,8 @@ ERRORS = {
     ("newton", "VBD"): (1.83e-2, 1),
     ("newton", "Kamino"): (3.66e-3, 1),
     ("newton", "MuJoCo_euler"): EULER,
+    ("newton", "MuJoCo_cpu_euler"): EULER,
+    ("newton", "MuJoCo_cpu_rk4"): (8.83e-6, 2),
     ("newton", "MuJoCo_rk4"): (9e-5, None),  # worse with a smaller step: single precision
     ("diffrax", "Tsit5"): (3.9e-14, 5),
     ("nimble", ""): (7.43e-3, 1),
