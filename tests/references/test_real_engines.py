@@ -301,19 +301,19 @@ def test_basilisk_refuses_by_name_what_it_does_not_support():
 @pytest.mark.engine("rocketpy")
 def test_solid_propulsion_of_rocketpy_stands_still():
     install("rocketpy")
-    run = cv.integrate(SCENE, 0.01, method=registry.method("rocketpy:equations=solid_propulsion"))
+    run = cv.integrate(SCENE, 0.05, method=registry.method("rocketpy:equations=solid_propulsion"))
     assert np.array_equal(run.R_WB, np.broadcast_to(np.eye(3), run.R_WB.shape))
     assert np.array_equal(run.w_WB_B, np.broadcast_to(SCENE.w_WB_B0, run.w_WB_B.shape))
-    truth = cv.integrate(SCENE, 0.01, method=registry.method("exact"))
+    truth = cv.integrate(SCENE, 0.05, method=registry.method("exact"))
     assert angle_between(truth.R_WB, run.R_WB).max() > 3.1
 
 
 @pytest.mark.engine("rocketpy")
 def test_functions_of_time_of_rocketpy_are_less_accurate_than_its_steps():
     install("rocketpy")
-    truth = cv.integrate(SCENE, 0.01, method=registry.method("exact"))
+    truth = cv.integrate(SCENE, 0.05, method=registry.method("exact"))
     between, at = (
-        angle_between(truth.R_WB, cv.integrate(SCENE, 0.01, method=registry.method(f"rocketpy:DOP853,1e-10,{each}")).R_WB).max()
+        angle_between(truth.R_WB, cv.integrate(SCENE, 0.05, method=registry.method(f"rocketpy:DOP853,1e-10,{each}")).R_WB).max()
         for each in ("as_installed=true", "")
     )
     assert at < 1e-9 < 1e-5 < between
