@@ -26,7 +26,7 @@ MARKERS = {
     "attack": "searches for failures at random; runs with --attack",
     "late": "runs last, with kernels that other tests have compiled",
 }
-ENGINES = "exudyn,rapier3d,bsk,mujoco@3.6.0" + ",jolt,rapier_js" * bool(shutil.which("npm"))
+ENGINES = "exudyn,rapier3d,bsk,box3d,mujoco@3.6.0" + ",jolt,rapier_js" * bool(shutil.which("npm"))
 ENGINES += ",ode,bullet" * all(Path("/usr/include", name).exists() for name in ("ode", "bullet", "nlohmann"))
 """Engines whose tests `--all` runs. They install within a minute; the others take gigabytes."""
 

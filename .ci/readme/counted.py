@@ -10,6 +10,9 @@ from pages import ROOT, read_csv, table
 FIGURES, SOURCES = (ROOT / "tests" / "data" / f"published_{name}.csv" for name in ("figures", "sources"))
 BODIES = ROOT / "references" / "model_files" / "measured.csv"
 MISTAKES = ROOT / "reports" / "documentation" / "mistakes.csv"
+BRICK = ROOT / "references" / "engines" / "brick.csv"
+LOST = 1.0
+"""Attitude errors, rad, above which the attitude is lost."""
 LATE = 10
 """Programs that print all digits of a double print their round-off too: figures that differ from here on are counted apart."""
 
@@ -47,5 +50,22 @@ def mistakes() -> str:
     return count("subject", answers, short)
 
 
-TABLES: dict[str, Callable[[], str]] = {"published figures": figures, "loaded bodies": bodies, "named mistakes": mistakes}
+def brick() -> str:
+    """Return a sentence on the engines whose errors on the paper's brick are stored."""
+    rows = read_csv(BRICK)
+    lost = sum(float(row["error, rad"] or 0) > LOST for row in rows)
+    what = "the largest attitude error, the largest relative energy drift and the observed order"
+    return (
+        f"[brick.csv](engines/brick.csv) has {what}\n"
+        f"of {len(rows)} engines, as installed and with their best settings. "
+        f"As installed, {lost} of them lose the attitude (more than 1 rad).\n"
+    )
+
+
+TABLES: dict[str, Callable[[], str]] = {
+    "published figures": figures,
+    "loaded bodies": bodies,
+    "named mistakes": mistakes,
+    "engines on the brick": brick,
+}
 """Tables by the name of their mark."""

@@ -4,13 +4,14 @@ A free body is on Drake's quaternion floating joint. A body about a fixed point 
 whose coordinates are roll, pitch and yaw: errors grow when the first principal axis comes near the vertical, and a run in which
 it reaches the vertical ends there. A fixed spring with a rest length is a `LinearSpringDamper`. Other fields, except gravity,
 are a `LeafSystem` in Python, which Drake calls in each evaluation. Switched off: error control (`set_fixed_step_mode`), unless
-an accuracy is given or the integrator is "default".
+an accuracy is given or the integrator is "default". After a fixed step of "cenic", `EvalBodyPoseInWorld` returns the pose
+before the step, so the cache is invalidated first.
 
 Parameters
 ----------
 integrator
-    "discrete" (the plant's own update), one of Drake's integrators for a continuous plant, such as "runge_kutta5", or
-    "default": the integrator of `Simulator`, with error control and steps of at most dt.
+    "discrete" (the plant's own update), one of Drake's integrators for a continuous plant, such as "runge_kutta5" or "cenic",
+    or "default": the integrator of `Simulator`, with error control and steps of at most dt.
 accuracy
     Relative accuracy of adaptive steps of at most dt, up to 1; 0 for fixed steps of dt.
 
@@ -20,6 +21,7 @@ Simulator: https://drake.mit.edu/doxygen_cxx/classdrake_1_1systems_1_1_simulator
 Its defaults: https://github.com/RobotLocomotion/drake/blob/master/systems/analysis/simulator_config.h
 Fixed steps: https://drake.mit.edu/doxygen_cxx/classdrake_1_1systems_1_1_integrator_base.html
 BallRpyJoint: https://drake.mit.edu/doxygen_cxx/classdrake_1_1multibody_1_1_ball_rpy_joint.html
+CENIC: https://drake.mit.edu/doxygen_cxx/classdrake_1_1multibody_1_1_cenic_integrator.html
 Springs: https://drake.mit.edu/doxygen_cxx/classdrake_1_1multibody_1_1_linear_spring_damper.html
 No ball joint of quaternions: https://github.com/RobotLocomotion/drake/issues/12404
 """
@@ -38,13 +40,16 @@ ENGINE = {
     "orders": {
         **{"default": None, "discrete": 1, "explicit_euler": 1, "semi_explicit_euler": 1, "implicit_euler": 1},
         **{"velocity_implicit_euler": 1, "runge_kutta2": 2, "runge_kutta3": 3, "runge_kutta5": 5, "bogacki_shampine3": 3},
-        **{"radau1": 1, "radau3": 3},
+        **{"radau1": 1, "radau3": 3, "cenic": 1},
     },
     "tolerance": "accuracy",
     "fields": FIELDS,
     "descriptions": ("frame", "offset", "file", "child", "world", "time"),
     "method_info": {
-        "variants": ("discrete", "runge_kutta3", "runge_kutta5", "runge_kutta5,accuracy=1e-12", "runge_kutta5,accuracy=1e-16"),
+        "variants": (
+            *("discrete", "cenic", "runge_kutta3", "runge_kutta5"),
+            *("runge_kutta5,accuracy=1e-12", "runge_kutta5,accuracy=1e-16"),
+        ),
         "suite": ("discrete", "runge_kutta5"),
         "as_installed": ("default",),
         "flight": True,
@@ -78,6 +83,8 @@ def prepare(given):
             for sample, time in enumerate(times.tolist()):
                 if sample:  # AdvanceTo(0) would update a discrete plant
                     simulator.AdvanceTo(time)
+                if given.integrator == "cenic":  # in fixed steps it leaves the pose of the step before in the cache
+                    context.get_mutable_continuous_state()
                 pose, velocity = plant.EvalBodyPoseInWorld(inner, body), plant.EvalBodySpatialVelocityInWorld(inner, body)
                 R[sample], w[sample], p[sample] = pose.rotation().matrix(), velocity.rotational(), pose.translation()
                 v[sample] = velocity.translational()
@@ -114,7 +121,10 @@ def _start(drake, plant, body, context, given):
 def _build(drake, given):
     discrete = given.integrator == "discrete"
     builder = drake.DiagramBuilder()
-    plant = builder.AddSystem(drake.MultibodyPlant(given.dt if discrete else 0.0))
+    if given.integrator == "cenic":  # it finds the plant by its name, and needs a scene graph
+        plant, _ = drake.AddMultibodyPlantSceneGraph(builder, 0.0)
+    else:
+        plant = builder.AddSystem(drake.MultibodyPlant(given.dt if discrete else 0.0))
     if description_of(given) == "world":
         plant.AddRigidBody("far", drake.SpatialInertia.SolidSphereWithMass(FAR_MASS, 2.0))
     if description_of(given) == "file":

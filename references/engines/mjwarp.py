@@ -8,7 +8,7 @@ bodies has its own world.
 Parameters
 ----------
 integrator
-    "Euler", "RK4" or "implicitfast".
+    "Euler", "RK4", "implicit", "implicitfast" or "discrete", of which older versions do not have all.
 
 References
 ----------
@@ -28,12 +28,12 @@ ENGINE = {
     "module": "mujoco_warp",
     "oldest": "3.10",
     "settings": {"integrator": "RK4"},
-    "orders": {"Euler": 1, "RK4": 4, "implicitfast": 1},
+    "orders": {"Euler": 1, "RK4": 4, "implicit": 1, "implicitfast": 1, "discrete": 1},
     "precision": "f32",
     "fields": ("UniformGravity",),
     "descriptions": ("frame", "child", "damping"),
     "method_info": {
-        "variants": ("Euler", "RK4", "implicitfast"),
+        "variants": ("Euler", "RK4", "implicit", "implicitfast", "discrete"),
         "many": ("RK4",),
         "as_installed": ("Euler",),
     },

@@ -11,7 +11,8 @@ Parameters
 ----------
 solver
     "SemiImplicit", "XPBD", "Featherstone", "VBD", "Kamino", or MuJoCo Warp inside Newton (`SolverMuJoCo`) with an integrator:
-    "MuJoCo_euler", "MuJoCo_implicitfast" or "MuJoCo_rk4".
+    "MuJoCo_euler", "MuJoCo_implicitfast" or "MuJoCo_rk4"; or MuJoCo itself there (`use_mujoco_cpu`): "MuJoCo_cpu_euler",
+    "MuJoCo_cpu_implicitfast" or "MuJoCo_cpu_rk4".
 as_installed
     True if Newton's own defaults stay: damping, contacts, the solver inside Kamino.
 
@@ -32,6 +33,7 @@ from .shared import FAR_MASS, FAR_PLACE, description_of, halves, record_warp, wr
 ORDERS = {
     **{"SemiImplicit": 1, "XPBD": 1, "Featherstone": 1, "VBD": 1, "Kamino": 1},
     **{"MuJoCo_euler": 1, "MuJoCo_implicitfast": 1, "MuJoCo_rk4": 4},
+    **{"MuJoCo_cpu_euler": 1, "MuJoCo_cpu_implicitfast": 1, "MuJoCo_cpu_rk4": 2},
 }
 ENGINE = {
     "package": "newton[sim]",  # without the extra it lacks MuJoCo
@@ -41,7 +43,7 @@ ENGINE = {
     "settings": {"solver": "MuJoCo_rk4", "as_installed": False},
     "orders": ORDERS,
     "precision": "f32",
-    "descriptions": ("frame", "file", "child", "world"),
+    "descriptions": ("frame", "file", "setter", "child", "world"),
     "fields": ("UniformGravity",),
     "free_only": {
         "SemiImplicit": "the joints of SolverSemiImplicit are springs, too stiff for such steps",
@@ -54,10 +56,12 @@ ENGINE = {
 }
 
 DAMPED = ("SemiImplicit", "Featherstone")
+DUMMY = (0.1, 0.2, 0.3), np.array([[2.0, 0.1, 0.2], [0.1, 3.0, 0.3], [0.2, 0.3, 4.0]])
+"""Centre of mass, m, and inertia, kg m^2, of a body before its setters."""
 WITH_MEMORY = ("VBD", "Kamino")
 """Solvers that keep more than the state from step to step, which `reset` clears."""
-NOT_RECORDED = "VBD"
-"""A replay of its step mistakes the pose of each step for the previous one, so that nothing moves."""
+NOT_RECORDED = ("VBD", "MuJoCo_cpu_euler", "MuJoCo_cpu_implicitfast", "MuJoCo_cpu_rk4")
+"""A replay of VBD's step mistakes the pose of each step for the previous one, so that nothing moves. MuJoCo is not Warp's."""
 
 
 def prepare(given):
@@ -69,6 +73,8 @@ def prepare(given):
     warp.set_device("cpu")
     model = _model(newton, warp, given)
     solver = _solver(newton, model, given)
+    if description_of(given) == "setter":
+        _set_body(newton, model, solver, given)
     contacts = newton.CollisionPipeline(model).contacts() if given.solver == "VBD" else None  # VBD does not step without
     states, start, control = (model.state(), model.state()), model.state(), model.control()
     newton.eval_ik(model, start, start.joint_q, start.joint_qd)
@@ -80,7 +86,7 @@ def prepare(given):
     steps = [partial(step, *states), partial(step, *reversed(states))]
     for run_step in steps:
         run_step()
-    steps = steps if given.solver == NOT_RECORDED else [record_warp(run_step) for run_step in steps]
+    steps = steps if given.solver in NOT_RECORDED else [record_warp(run_step) for run_step in steps]
     # Views of the engine's own arrays: position and quaternion, scalar last; velocities in the world.
     views = [(state.body_q.numpy()[0], state.body_qd.numpy()[0]) for state in states]
 
@@ -128,6 +134,8 @@ def _add_body(builder, warp, given):
         "inertia": warp.mat33(*given.inertia_com.ravel().tolist()),
         "mass": given.mass,
     }
+    if description_of(given) == "setter":
+        options |= {"com": warp.vec3(*DUMMY[0]), "inertia": warp.mat33(*DUMMY[1].ravel().tolist()), "mass": 1.0}
     if given.free and description_of(given) == "file":
         builder.add_urdf(write_urdf(given), floating=True)
         builder.body_q[0] = options["xform"]
@@ -143,9 +151,23 @@ def _add_body(builder, warp, given):
     return body
 
 
+def _set_body(newton, model, solver, given):
+    """Set mass, centre of mass and inertia of the model, and tell the solver, which has computed with others.
+
+    Solvers of Newton read the inverses, too, which no setter computes.
+    """
+    inverse = np.linalg.inv(given.inertia_com)
+    values = {"mass": given.mass, "com": given.com, "inertia": given.inertia_com}
+    for name, value in {**values, "inv_mass": 1 / given.mass, "inv_inertia": inverse}.items():
+        getattr(model, f"body_{name}").assign(np.array([value], np.float32))
+    solver.notify_model_changed(newton.ModelFlags.BODY_INERTIAL_PROPERTIES)
+
+
 def _solver(newton, model, given):
-    name, _, integrator = given.solver.partition("_")
+    name, *cpu, integrator = given.solver.split("_") if "_" in given.solver else (given.solver, "")
     options = {"integrator": integrator} if integrator else {}
+    if cpu:
+        options["use_mujoco_cpu"] = True
     if not given.as_installed and name in DAMPED:
         options["angular_damping"] = 0.0
     if not given.as_installed and name == "MuJoCo":

@@ -12,7 +12,7 @@ import pytest
 import conservative as cv
 from conservative import registry
 from conservative.attitude import angle_between, from_quaternion, rotation_about, to_quaternion
-from conservative.errors import BadInput
+from conservative.errors import BadInput, Unsupported
 from conservative.grid import grid_for
 from conservative.references.engine import principal_axes
 from conservative.references.environments.apt import Apt
@@ -42,7 +42,18 @@ ROWS = {
     ("exudyn", "GeneralizedAlpha"): (2.1e-3, -1e-6, 5e-4, 2),
     ("bsk", "RK4"): (2.3e-6, -2e-8, 1e-6, 4),
     ("bsk", "RKF78"): (9e-13, None, None, None),
+    ("bsk", "MJScene_Euler"): ENERGY_GROWS,
+    ("bsk", "MJScene_RK2"): (3.6e-3, 1.1e-4, 1.1e-3, None),
+    ("bsk", "MJScene_RK4"): (1.6e-3, -2e-8, 1.6e-5, 2),
+    ("bsk", "MJScene_RKF78"): (1.6e-3, None, 1.6e-5, 2),
+    ("bsk", "MJScene_high_RK4"): (2.3e-6, -2e-8, 8e-7, 4),
+    ("bsk", "MJScene_high_RKF78"): (1.4e-12, None, None, None),
+    ("box3d", ""): (0.76, -0.046, 0.024, 1),
+    ("box3d", "substeps=1"): ENERGY_DECAYS,
+    ("box3d", "as_installed=true"): (0.76, -0.046, 0.024, 1),
     ("drake", "discrete"): ENERGY_GROWS,
+    ("drake", "cenic"): ENERGY_GROWS,
+    ("drake", "cenic,1e-6"): (7.6e-2, 4.6e-3, 2.4e-3, None),
     ("drake", "runge_kutta3"): (3.0, 2e-4, 3e-4, None),
     ("drake", "runge_kutta5"): (1.1e-4, 7e-9, 1e-8, 5),
     ("drake", "runge_kutta3,1e-10"): (1e-6, None, None, None),
@@ -61,6 +72,8 @@ ROWS = {
     ("mjwarp", "Euler"): ENERGY_GROWS,
     ("mjwarp", "RK4"): (4.4e-4, None, None, None),
     ("mjwarp", "implicitfast"): ENERGY_DECAYS,
+    ("mjwarp", "implicit"): ENERGY_DECAYS,
+    ("mjwarp", "discrete"): ENERGY_DECAYS,
     ("newton", "SemiImplicit"): ENERGY_GROWS,
     ("newton", "SemiImplicit,as_installed=true"): (0.35, -0.35, 0.19, None),
     ("newton", "XPBD"): ENERGY_GROWS,
@@ -70,6 +83,9 @@ ROWS = {
     ("newton", "MuJoCo_euler"): ENERGY_GROWS,
     ("newton", "MuJoCo_implicitfast"): ENERGY_DECAYS,
     ("newton", "MuJoCo_rk4"): (1.2e-2, 1.6e-4, 8.4e-5, None),
+    ("newton", "MuJoCo_cpu_euler"): ENERGY_GROWS,
+    ("newton", "MuJoCo_cpu_implicitfast"): ENERGY_DECAYS,
+    ("newton", "MuJoCo_cpu_rk4"): (1.7e-3, None, None, None),
     ("brax", "generalized"): ENERGY_GROWS,
     ("brax", "generalized,f32"): ENERGY_GROWS,
     ("brax", "positional"): (0.84, -0.6, 0.37, None),
@@ -111,6 +127,8 @@ ROWS = {
     ("havok", ""): NO_GYROSCOPIC_MOTION,
     ("lammps", "nve"): (4.0e-4, None, None, 2),
     ("lammps", "rigid"): (3.1, None, None, None),
+    ("rocketpy", ""): (5e-12, None, None, None),
+    ("rocketpy", "equations=solid_propulsion"): (1.66, None, None, 0),
 }
 BUILT = Source(allow_build=True)
 """JaxSim and Genesis need a package each that has no wheel."""
@@ -190,6 +208,8 @@ DEFAULTS = {
     "drake": ("default", (1.85, 4.5e-5, 8e-5, None)),
     "exudyn": ("default", (1.66e-2, -9.2e-6, 7e-4, 2)),
     "bsk": ("RK4", (2.3e-6, -2e-8, 8e-7, 4)),
+    "box3d": ("substeps=4,as installed,f32", (0.76, -0.046, 0.024, 1)),
+    "rocketpy": ("LSODA,rtol=1e-06,as installed", (3.06e-4, None, None, None)),
     "dart": ("semi-implicit Euler", ENERGY_GROWS),
     "mjx": ("Euler,f32", ENERGY_GROWS),
     "mujoco@4.0.0": ("Euler", ENERGY_GROWS),
@@ -219,6 +239,85 @@ def test_an_engine_as_installed(engine):
     (method,) = registry.engine(environment.engine).at_version(environment.version).settings_for("as_installed")
     assert method.label == f"{environment.engine}=={environment.version}/{label}"
     check_row(engine, method.name.partition(":")[2], figures)
+
+
+def spinning(rate, moments=(13.0, 5.0, 10.0)):
+    """A body that turns about its largest axis."""
+    return cv.Scene("spinning", cv.RigidBody(moments), np.eye(3), (rate, 0.0, 0.0), 1.0)
+
+
+@pytest.mark.engine("box3d")
+@pytest.mark.parametrize("substeps", [1, 4])
+def test_box3d_as_installed_turns_an_eighth_of_a_turn_in_a_step_at_most(substeps):
+    install("box3d")
+    limited, free = (registry.method(f"box3d:substeps={substeps},as_installed={each}") for each in ("true", "false"))
+    for dt, rate in ((0.01, 78.54), (1 / 60, 47.12)):  # 45 degrees in a step, whatever the substeps
+        run = cv.integrate(spinning(100.0), dt, method=limited)
+        assert run.w_WB_B[-1, 0] == pytest.approx(rate, rel=1e-4)  # measured 78.5398 and 47.1239
+        assert cv.integrate(spinning(100.0), dt, method=free).w_WB_B[-1, 0] == pytest.approx(100, rel=1e-6)
+    assert cv.integrate(spinning(78.0), 0.01, method=limited).w_WB_B[-1, 0] == pytest.approx(78, rel=1e-6)
+
+
+@pytest.mark.engine("box3d")
+def test_box3d_as_installed_puts_a_slow_body_to_sleep():
+    install("box3d")
+    slow = cv.Scene("slow", cv.RigidBody((13, 5, 10)), np.eye(3), (0.001, 0.0, 0.0), 2.0)
+    asleep, awake = (cv.integrate(slow, 0.01, method=registry.method(f"box3d:{each}")) for each in ("as_installed=true", ""))
+    assert asleep.w_WB_B[-1, 0] == 0
+    assert awake.w_WB_B[-1, 0] == pytest.approx(0.001, rel=1e-6)
+
+
+@pytest.mark.engine("box3d")
+@pytest.mark.parametrize(("size", "turns"), [(1e-11, True), (1e-12, False), (1e11, True), (1e12, False)])
+def test_box3d_has_no_gyroscopic_motion_of_very_small_and_very_large_moments(size, turns):
+    """Measured limits: about 2.2e-12 and 4.5e11 kg m^2, in single precision."""
+    install("box3d")
+    scene = cv.Scene("sized", cv.RigidBody(size * np.array([1.3, 0.9, 1.0])), np.eye(3), (0.1, 1.0, 0.2), 1.0)
+    run = cv.integrate(scene, 0.01, method=registry.method("box3d"))
+    assert (np.abs(run.w_WB_B[-1] - scene.w_WB_B0).max() > 0.01) == turns  # measured 0.04 and 0
+
+
+@pytest.mark.engine("drake")
+@pytest.mark.parametrize(("rate", "turns"), [(1e-5, True), (1e-7, False)])
+def test_cenic_keeps_the_rates_of_a_body_with_little_energy(rate, turns):
+    """Its solver iterates to an absolute tolerance: measured at about 1e-12 J."""
+    install("drake")
+    start = rate * np.array([0.8, -1.1, 1.7])
+    scene = cv.Scene("slow", cv.RigidBody((2.1, 3.3, 4.2)), np.eye(3), start, 0.1 / rate)
+    run = cv.integrate(scene, 0.01 / rate, method=registry.method("drake:cenic"))
+    assert (np.abs(run.w_WB_B[-1] - start).max() > 0.01 * rate) == turns
+
+
+@pytest.mark.engine("bsk")
+def test_basilisk_refuses_by_name_what_it_does_not_support():
+    install("bsk")
+    wheel = cv.scenes.dual_spin_turn(t_end=0.1)
+    assert cv.integrate(wheel, 0.01, method=registry.method("bsk:RK4")).ok
+    with pytest.raises(Unsupported, match="wheel"):
+        cv.integrate(wheel, 0.01, method=registry.method("bsk:MJScene_RK4"))
+    with pytest.raises(Unsupported, match="nanoseconds"):
+        cv.integrate(SCENE, 1 / 300, method=registry.method("bsk"))
+
+
+@pytest.mark.engine("rocketpy")
+def test_solid_propulsion_of_rocketpy_stands_still():
+    install("rocketpy")
+    run = cv.integrate(SCENE, 0.05, method=registry.method("rocketpy:equations=solid_propulsion"))
+    assert np.array_equal(run.R_WB, np.broadcast_to(np.eye(3), run.R_WB.shape))
+    assert np.array_equal(run.w_WB_B, np.broadcast_to(SCENE.w_WB_B0, run.w_WB_B.shape))
+    truth = cv.integrate(SCENE, 0.05, method=registry.method("exact"))
+    assert angle_between(truth.R_WB, run.R_WB).max() > 3.1
+
+
+@pytest.mark.engine("rocketpy")
+def test_functions_of_time_of_rocketpy_are_less_accurate_than_its_steps():
+    install("rocketpy")
+    truth = cv.integrate(SCENE, 0.05, method=registry.method("exact"))
+    between, at = (
+        angle_between(truth.R_WB, cv.integrate(SCENE, 0.05, method=registry.method(f"rocketpy:DOP853,1e-10,{each}")).R_WB).max()
+        for each in ("as_installed=true", "")
+    )
+    assert at < 1e-9 < 1e-5 < between
 
 
 @pytest.mark.parametrize("engine", [of(each) for each in ("diffrax", "orekit")])
@@ -269,14 +368,19 @@ ERRORS = {
     ("mjx", "RK4"): (9.13e-6, 2),
     ("mjx", "RK4,f32"): (8.98e-6, None),
     ("mjwarp", "Euler"): EULER,
+    ("mjwarp", "implicit"): (4.82e-3, 1),
+    ("mjwarp", "discrete"): EULER,
     ("newton", "Featherstone"): EULER,
     ("newton", "VBD"): (1.83e-2, 1),
     ("newton", "Kamino"): (3.66e-3, 1),
     ("newton", "MuJoCo_euler"): EULER,
+    ("newton", "MuJoCo_cpu_euler"): EULER,
+    ("newton", "MuJoCo_cpu_rk4"): (8.83e-6, 2),
     ("newton", "MuJoCo_rk4"): (9e-5, None),  # worse with a smaller step: single precision
     ("diffrax", "Tsit5"): (3.9e-14, 5),
     ("nimble", ""): (7.43e-3, 1),
     ("drake", "discrete"): (2.39e-2, 1),  # angles as coordinates
+    ("drake", "cenic"): (2.39e-2, 1),
     ("drake", "runge_kutta3"): (2.10e-6, 3),
     ("drake", "runge_kutta5"): (7.96e-11, 5),
     ("opensim", "RungeKuttaMerson"): (1.69e-7, 4),
@@ -292,6 +396,8 @@ ERRORS = {
     ("mujoco_js", "RK4"): (9.13e-6, 2),
     ("mujoco_js", "Euler"): EULER,
     ("cannon_es", ""): (WITHOUT_GYROSCOPIC, 0),
+    ("box3d", ""): (1.12e-2, 1),
+    ("box3d", "substeps=1"): (1.71e-2, 1),
     ("ode", "finite"): (2.72e-2, 1),
     ("ode", "infinitesimal"): (2.73e-2, 1),
     ("bullet", "body"): (1.7e-2, 1),
@@ -323,12 +429,19 @@ FREE_ERRORS = {
     ("simbody", "Verlet"): (3.86e-5, 2),
     ("lammps", "nve"): (4.05e-5, 2),
     ("lammps", "rigid"): (6.29e-5, 2),
+    ("box3d", ""): (8.92e-4, 1),
+    ("box3d", "substeps=1"): (3.6e-3, 1),
+    ("drake", "cenic"): (3.73e-3, 1),
+    ("bsk", "MJScene_RK4"): (6.79e-6, 2),
+    ("bsk", "MJScene_high_RK4"): (6.99e-11, 4),
 }
-"""Errors on the generic free body after 2 s: engines whose scripts are not in Python, and LAMMPS."""
+"""Errors on the generic free body after 2 s: engines whose scripts are not in Python, LAMMPS, and later ones."""
 LARGEST_ERROR = max(error for error, order in ERRORS.values() if order != 0)
 FREE_ONLY = [
     ("brax", "", "Brax reads no ball joint"),
     ("bsk", "", "a spacecraft is free"),
+    ("bsk", "MJScene_RK4", "MJScene"),
+    ("rocketpy", "", "a rocket flies"),
     ("jsbsim", "", "an aircraft flies"),
     ("orekit", "", "the motion of a free body"),
     ("lammps", "", "no rigid bodies about fixed points"),
