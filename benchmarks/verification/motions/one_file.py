@@ -150,7 +150,7 @@ def _line(key: str, values: Any) -> str:
 
 def _rounded(values: Sequence[float], size: float) -> str:
     """Return numbers rounded to digits of a size."""
-    decimals = DIGITS - math.ceil(math.log10(size))
+    decimals = DIGITS - math.floor(math.log10(size))
     return ",".join(_short(round(x, decimals), 17) for x in values)
 
 
