@@ -1,13 +1,9 @@
 """Motions as files: every digit by a second solution, tolerances, and signatures. `test_rotation_tests.py` runs the tests."""
 
-import contextlib
 import csv
 import hashlib
-import importlib.util
 import json
 import math
-import re
-import subprocess
 from itertools import product
 
 import mpmath
