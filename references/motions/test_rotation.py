@@ -253,60 +253,76 @@ def compare(results, order, path, skipped):
     return lines + [f"free rotation at your step: {text}"] * bool(text), new
 
 
+def read_arguments(arguments):
+    """Return the motions, and the files to record and to compare with, or None."""
+    asked, paths = {name: os.environ.get(f"ROTATION_{name.upper()}") for name in ("record", "known")}, []
+    values = iter(arguments)
+    for each in values:
+        if each in ("--record", "--known"):
+            asked[each[2:]] = next(values, None)
+            if not asked[each[2:]]:
+                raise Refused(f"{each}: expected the name of a file")
+        elif each[:1] == "-" or not Path(each).exists():
+            raise Refused(f"{each}: expected --record FILE, --known FILE, a folder of motions or CSV files")
+        else:
+            paths += sorted(Path(each).glob("*.csv")) if Path(each).is_dir() else [Path(each)]
+    if asked["record"] and asked["known"]:
+        raise Refused("record and known are both given: give one of them")
+    beside, motions = Path(__file__).resolve().parent / "known.txt", []
+    known = asked["known"] or (beside if not asked["record"] and beside.exists() else None)
+    for path in paths:
+        motions += read(path.read_text(encoding="utf-8").splitlines()) or [None]
+        if motions[-1] is None:
+            raise Refused(f"{path}: a file without a motion")
+    return motions or read(MOTIONS.splitlines()), asked["record"], known
+
+
+def summary(results, order):
+    """Return how many motions fail, and why."""
+    failing = [r for r in results if r["failed"]]
+    named, rest = name_mistakes(failing)
+    lines = [f"{len(failing)} of {len(results)} motions failed", *named]
+    if 2 * len(rest) > len(failing) and order is not None and 0.5 <= order < ORDER - 0.5:
+        lines.append(f"this program has order {order:.1f}, {ORDER} was declared")
+    if rest:
+        lines.append(f"{len(rest)} not explained by a mistake: {', '.join(r['name'] for r in rest[:5])}")
+    return lines
+
+
+def run_motions(arguments, say):
+    motions, record, known = read_arguments(arguments)
+    results, skipped = [], []
+    for m in motions:
+        if missing := [part for part in m["features"] if part not in HAS.split(", ")]:
+            say(f"{m['name']}: skipped, it has {missing[0]}")
+            skipped.append(m["name"])
+        else:
+            results.append(check(m))
+    orders = sorted(r["order"] for r in results if r["order"] is not None)
+    order = orders[len(orders) // 2] if orders else None
+    lines = summary(results, order)
+    for r in results:
+        if r["note"] or (r["failed"] and not known):
+            text = r["note"] or f"; {r['mistake'] or 'no known mistake'}"
+            say(f"{error(r, r['most'])}, tolerance {r['limit'][r['most']]:.1e}{text}")
+    new = failed = sum(r["failed"] for r in results)
+    if known:
+        lines, new = compare(results, order, known, skipped)
+    for line in lines:
+        say(line)
+    if record:
+        write_known(record, results, order)
+        say(f"{record}: {len(results)} motions recorded, {failed} known errors")
+        return 0
+    if new and not known:
+        say("Known and accepted? --record known.txt (or ROTATION_RECORD=known.txt): then only new failures fail")
+    return int(new > 0)
+
+
 def run(arguments, say=print):
     """Test the motions and return the exit code: 0, 1 if a motion fails, 2 if the test is not possible."""
-    folder, paths = Path(__file__).resolve().parent, []
-    asked = {name: os.environ.get(f"ROTATION_{name.upper()}") for name in ("record", "known")}
     try:
-        values = iter(arguments)
-        for each in values:
-            if each in ("--record", "--known"):
-                asked[each[2:]] = next(values, None)
-                if not asked[each[2:]]:
-                    raise Refused(f"{each}: expected the name of a file")
-            elif each[:1] == "-" or not Path(each).exists():
-                raise Refused(f"{each}: expected --record FILE, --known FILE, a folder of motions or CSV files")
-            else:
-                paths += sorted(Path(each).glob("*.csv")) if Path(each).is_dir() else [Path(each)]
-        if asked["record"] and asked["known"]:
-            raise Refused("record and known are both given: give one of them")
-        known = asked["known"] or (not asked["record"] and (folder / "known.txt").exists() and folder / "known.txt")
-        motions = [m for path in paths for m in read(path.read_text(encoding="utf-8").splitlines())]
-        if len(motions) < len(paths) or (len(arguments) and not motions and paths):
-            raise Refused("a file without a motion")
-        motions = motions or read(MOTIONS.splitlines())
-        results, skipped = [], []
-        for m in motions:
-            if missing := [part for part in m["features"] if part not in HAS.split(", ")]:
-                say(f"{m['name']}: skipped, it has {missing[0]}")
-                skipped.append(m["name"])
-            else:
-                results.append(check(m))
-        orders = sorted(r["order"] for r in results if r["order"] is not None)
-        order = orders[len(orders) // 2] if orders else None
-        failing = [r for r in results if r["failed"]]
-        named, rest = name_mistakes(failing)
-        for r in results:
-            if r["note"] or (r["failed"] and not known):
-                text = r["note"] or f"; {r['mistake'] or 'no known mistake'}"
-                say(f"{error(r, r['most'])}, tolerance {r['limit'][r['most']]:.1e}{text}")
-        lines, new = compare(results, order, known, skipped) if known else ([], len(failing))
-        if not known:
-            say(f"{len(failing)} of {len(results)} motions failed")
-            lines += named
-            if 2 * len(rest) > len(failing) and order is not None and 0.5 <= order < ORDER - 0.5:
-                lines.append(f"this program has order {order:.1f}, {ORDER} was declared")
-            if rest:
-                lines.append(f"{len(rest)} not explained by a mistake: {', '.join(r['name'] for r in rest[:5])}")
-        for line in lines:
-            say(line)
-        if asked["record"]:
-            write_known(asked["record"], results, order)
-            say(f"{asked['record']}: {len(results)} motions recorded, {len(failing)} known errors")
-            return 0
-        if new and not known:
-            say("Known and accepted? --record known.txt (or ROTATION_RECORD=known.txt): then only new failures fail")
-        return int(new > 0)
+        return run_motions(arguments, say)
     except Refused as e:
         say(e)
         return 2

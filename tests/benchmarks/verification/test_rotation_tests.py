@@ -1,4 +1,4 @@
-"""The tests of references/motions in each language, with right and wrong engines: all files and the embedded motions, known errors."""
+"""The tests of references/motions in each language, with right and wrong engines: all files and the embedded motions."""
 
 import importlib.util
 import json
