@@ -34,7 +34,7 @@ LANGUAGES = {
 
 @dataclass(frozen=True)
 class Engine:
-    """A Runge-Kutta method, and what is declared in the test: its order, |w| h, single precision, and features."""
+    """A Runge-Kutta method (none: the test as it is), and what is declared: order, |w| h, single precision and features."""
 
     method: tuple[float, ...]
     order: int
@@ -58,7 +58,8 @@ def write(language, folder, engine):
         ", ".join(repr(float(x)) for x in engine.method),
         engine.single or engine.rounds,
     )
-    text = MARK.sub(lambda _: code, (MOTIONS / name).read_text(), count=1)
+    text = (MOTIONS / name).read_text()
+    text = MARK.sub(lambda _: code, text, count=1) if engine.method else text
     yes = {"C": "1", "C++": "1", "Python": "True"}.get(language, "true")
     for pattern, new in (
         (r"\bORDER(: u32)? = 2\b", rf"ORDER\1 = {engine.order}"),
@@ -69,7 +70,7 @@ def write(language, folder, engine):
         (r"METHOD(: ..Real.)? = (&?\[\]|{})", lambda m: f"METHOD{m[1] or ''} = {m[2][:-1]}{numbers}{m[2][-1]}"),
     ):
         text = re.sub(pattern, new, text)
-    settings = [f"#define METHOD {numbers}", *["#define FLOAT"] * rounds] if own.endswith("h") else []
+    settings = [f"#define METHOD {numbers}", *["#define FLOAT"] * rounds] if own.endswith("h") and engine.method else []
     (folder / name).write_text("\n".join([*settings, text]))
 
 
