@@ -8,7 +8,7 @@ import os
 import re
 import tomllib
 from collections.abc import Callable, Iterator
-from functools import partial
+from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -139,8 +139,12 @@ def motions() -> str:
 
 def embed_motions(name: str, text: str) -> str:
     """Return the text of a test of references/motions with the motions that it should have."""
-    descriptions = one_file.small_set([files.read(motion.name) for motion in load()])
-    return one_file.fill(MOTION_TESTS[name], text, descriptions)
+    return one_file.fill(MOTION_TESTS[name], text, _small_set())
+
+
+@cache
+def _small_set() -> list[one_file.Description]:
+    return one_file.small_set([files.read(motion.name) for motion in load()])
 
 
 MOTION_TESTS = {name: language for language, name in one_file.LANGUAGES.items()}
