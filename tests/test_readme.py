@@ -40,8 +40,9 @@ def load(name):
 
 @pytest.fixture
 def copied(tmp_path):
-    """Return a folder with a copy of all pages."""
-    for page in pages():
+    """Return a folder with a copy of all pages, and of the tests of motions."""
+    tests = [ROOT / "references" / "motions" / name for name in load("declared").MOTION_TESTS]
+    for page in [*pages(), *tests]:
         copy = tmp_path / "copy" / page.relative_to(ROOT)
         copy.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(page, copy)
@@ -86,6 +87,7 @@ def test_all_pages_are_current():
         ("conservative/reference.md", "✓"),
         ("references/README.md", "| [`drake`]"),
         ("references/motions/README.md", "| rotor | `rotor`"),
+        ("references/motions/rotation_test.c", '"inertia_B,13,'),
         ("references/model_files/measured.md", "| mujoco 4.0.0 | 71"),
         ("reports/documentation/mistakes.md", "| test files |"),
         ("benchmarks/published.md", "| all | 58"),

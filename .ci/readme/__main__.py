@@ -1,4 +1,5 @@
 """Write README.md, and the generated parts of other pages: tables of times, of what the code declares, and counts of CSV files.
+The motions in the tests of references/motions are generated, too.
 
     python .ci/readme                 # write them
     python .ci/readme --check         # exit with 1 if one of them is not current
@@ -36,8 +37,9 @@ PARTS = {**measured.TABLES, **declared.TABLES, **counted.TABLES, "commands that 
 
 
 def read_pages(root: Path) -> dict[Path, str]:
-    """Return the texts of README.md and of the pages of the packages below a folder."""
+    """Return the texts of README.md, of the pages of the packages, and of the tests of motions below a folder."""
     pages = [root / "README.md", *(page for package in PACKAGES for page in (root / package).rglob("*.md"))]
+    pages += [root / "references" / "motions" / name for name in declared.MOTION_TESTS]
     return {page: page.read_text(encoding="utf-8") for page in pages}
 
 
@@ -75,6 +77,7 @@ def main(root: Path = ROOT) -> None:
         measure_again(options.folder, options.chosen, options.price)
     pages = read_pages(root)
     new = {page: fill(text, PARTS) for page, text in pages.items()} | {root / "README.md": measured.render_readme()}
+    new |= {page: declared.embed_motions(page.name, text) for page, text in pages.items() if page.name in declared.MOTION_TESTS}
     changed = [page for page in pages if new[page] != pages[page]]
     missing = {*PARTS} - {name for text in pages.values() for name in names(text)}
     if options.check and (changed or missing):

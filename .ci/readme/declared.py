@@ -8,12 +8,15 @@ import os
 import re
 import tomllib
 from collections.abc import Callable, Iterator
-from functools import partial
+from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from pages import ROOT, summary, table
+
+from conservative.benchmarks.verification.motions import files, one_file
+from conservative.benchmarks.verification.motions.motion import load
 
 GROUPS = ("conservative.methods", "conservative.engines")
 
@@ -127,9 +130,6 @@ def _quoted(kind: Any, name: str) -> list[str]:
 
 def motions() -> str:
     """Return a row for the motions with the same features."""
-    from conservative.benchmarks.verification.motions import files
-    from conservative.benchmarks.verification.motions.motion import load
-
     names: dict[str, list[str]] = {}
     for motion in load():
         features = ", ".join(files.read(motion.name)["features"]) or "free rotation"
@@ -137,6 +137,18 @@ def motions() -> str:
     return table(["needs", "motions"], [[features, ", ".join(motions)] for features, motions in names.items()])
 
 
+def embed_motions(name: str, text: str) -> str:
+    """Return the text of a test of references/motions with the motions that it should have."""
+    return one_file.fill(MOTION_TESTS[name], text, _small_set())
+
+
+@cache
+def _small_set() -> list[one_file.Description]:
+    return one_file.small_set([files.read(motion.name) for motion in load()])
+
+
+MOTION_TESTS = {name: language for language, name in one_file.LANGUAGES.items()}
+"""Languages by the names of the tests."""
 TABLES: dict[str, Callable[[], str]] = {
     "methods": methods,
     "support": support,

@@ -351,7 +351,7 @@ class Program:
         return out
 
     def simulate(self, motion, h, steps, samples):
-        """Return (quaternion, rates) of a motion (keys of its JSON file) after each `steps` steps, as test_motions.py asks."""
+        """Return (quaternion, rates) of a motion (keys of its JSON file) after each `steps` steps, as test_rotation.py asks."""
         ends = [steps * n for n in range(1, samples + 1)]
         return self.states(of_motion(motion), motion["quaternion_wxyz0"], motion["w_WB_B0"], h, ends)
 
