@@ -17,6 +17,7 @@ from pages import ROOT, summary, table
 
 from conservative.benchmarks.verification.motions import files, one_file
 from conservative.benchmarks.verification.motions.motion import load
+from conservative.benchmarks.verification.motions.signatures import remedies
 
 GROUPS = ("conservative.methods", "conservative.engines")
 
@@ -137,6 +138,14 @@ def motions() -> str:
     return table(["needs", "motions"], [[features, ", ".join(motions)] for features, motions in names.items()])
 
 
+def changes() -> str:
+    """Return a row for the mistakes that need the same change."""
+    names: dict[str, list[str]] = {}
+    for name, change in remedies().items():
+        names.setdefault(change, []).append(f"`{name}`")
+    return table(["NAME", "the line to change"], [[", ".join(named), change] for change, named in names.items()])
+
+
 def embed_motions(name: str, text: str) -> str:
     """Return the text of a test of references/motions with the motions that it should have."""
     return one_file.fill(MOTION_TESTS[name], text, _small_set())
@@ -155,5 +164,6 @@ TABLES: dict[str, Callable[[], str]] = {
     "engines": partial(engines, GROUPS[0], ROOT / "references" / "README.md"),
     "engines in environments": partial(engines, GROUPS[1], ROOT / "references" / "README.md"),
     "motions": motions,
+    "changes": changes,
 }
 """Tables by the name of their mark."""
