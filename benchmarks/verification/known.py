@@ -346,12 +346,16 @@ def _compare(finding: Finding, was: Case | None, random: bool) -> Finding:
         limits.append(allowed[k] + SHARE * _size(before))
         if not _size(error) <= (RANDOM if random else 1.0) * _size(before) + limits[k]:
             worse.append(k)
-    if _is_wrong(finding) and (worse or not _is_same(was.mistakes, mistakes, random)):
-        return _new(finding, was, worse)
     better = [k for k, limit in enumerate(limits) if _size(was.errors[k]) - _size(_errors(finding)[k]) > limit]
-    if better and not worse and not random and not _is_right(was, allowed):
+    improved = bool(better) and not worse and not random and not _is_right(was, allowed)
+    same = _is_same(was.mistakes, mistakes, random)
+    # A mistake that a larger one has hidden shows when that one is gone: a smaller error is no failure.
+    if _is_wrong(finding) and (worse or not (same or improved)):
+        return _new(finding, was, worse)
+    if improved:
         k = better[0]
         change = f"{_phrase(was.errors[k])} to {_phrase(_errors(finding)[k])} {_unit(finding, k)}".rstrip()
+        change += "" if same or not _is_wrong(finding) else f", now {_named(mistakes, finding)}"
         return replace(finding, standing=Standing.BETTER, change=f"{change}: record again to tighten")
     if not _is_wrong(finding) and not _is_right(was, allowed) and was.mistakes != {UNDECIDED} and math.isnan(finding.error):
         return replace(finding, standing=Standing.BETTER, change="wrong to right: record again to tighten")

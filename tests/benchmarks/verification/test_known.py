@@ -175,6 +175,16 @@ def test_what_is_better_is_said_and_is_no_failure(tmp_path):
     assert (repeated.exit_code, repeated.findings[0].standing) == (0, Standing.BETTER)
 
 
+def test_a_smaller_error_with_another_mistake_is_no_failure(tmp_path):
+    """A fix of the larger mistake shows the smaller one, which it has hidden."""
+    fixed = motion(errors=(0.05, 0.06), causes=(Cause(("no products of inertia",), "Dropped"),))
+    found = one((motion(),), (fixed,), tmp_path)
+    assert (found.exit_code, found.findings[0].standing) == (0, Standing.BETTER)
+    assert found.findings[0].change == "2.0e-01 to 5.0e-02 rad, now no products of inertia: record again to tighten"
+    half_better = replace(fixed, error=0.3, errors=(0.3, 0.06))
+    assert one((motion(),), (half_better,), tmp_path).exit_code == 1
+
+
 def test_a_smaller_error_of_a_right_case_is_not_news(tmp_path):
     right = motion(RIGHT, (0.009, 0.002), (), tolerances=(0.01, 0.02))
     assert one((right,), (replace(right, errors=(1e-9, 0.002)),), tmp_path).findings[0].standing is None
