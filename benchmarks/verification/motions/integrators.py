@@ -1,335 +1,660 @@
 """Integrators of every common design, for many motions at once: an attitude, a variable of rotation, and a step.
 
 They share no code with the methods of this package and with the catalogue of mistakes: the tolerances of motions are measured
-with them. All numbers of a motion are in units of its step and its largest moment, so that single precision does not overflow
-and one test ends the implicit steps of all motions.
+with them. All numbers of a motion are in units of its step and its largest moment, so that single precision does not overflow.
+Kernels compute in the precision of their arrays, so constants that are not exact have its type. A state has an attitude, four
+or nine numbers, and three numbers of the variable of rotation.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import Any
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from conservative.attitude import Array
+from conservative.kernels import entry, kernel
 
 from .motion import Motion
 
 ATTITUDES, VARIABLES = ("quaternion", "matrix"), ("rates", "momentum", "world rates", "world momentum")
 """The attitude of a state, and its other part: rates or momentum in body axes, or in world axes."""
+RATES, MOMENTUM, WORLD_RATES, WORLD_MOMENTUM = range(4)
+"""Places in `VARIABLES`."""
 
 
-def cross(a: Array, b: Array) -> Array:
-    """Return the cross product of vectors (3, n)."""
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+class Bodies(NamedTuple):
+    """The bodies and loads of motions, arrays (motions, ...) in units of their steps and largest moments, and their starts.
+
+    `loaded` says whether there is any load. `half` and `none` are 1/2 and 0 in the precision of the others, and `unit` the steps
+    (motions,) in s. `ends` has the numbers of steps of 0.1 rad after which there are samples, of one motion after the other; those
+    of a motion begin at its number in `first` (motions + 1,).
+    """
+
+    J: Any
+    inverse: Any
+    moments: Any
+    axes: Any
+    rotor: Any
+    body: Any
+    world: Any
+    damping: Any
+    arm: Any
+    orbit: Any
+    loaded: Any
+    q0: Any
+    w0: Any
+    half: Any
+    none: Any
+    unit: Any
+    ends: Any
+    first: Any
 
 
-def apply(M: Array, v: Array) -> Array:
-    """Return M v of matrices (3, 3, n) and vectors (3, n)."""
-    return (M * v[None]).sum(axis=1)
+def gather(motions: Sequence[Motion], single: bool = False) -> Bodies:
+    """Return the bodies of motions, in single or double precision."""
+    kind = np.float32 if single else np.float64
+    unit = np.array([motion.step for motion in motions])
+    size = np.array([np.linalg.eigvalsh(motion.inertia_B)[2] for motion in motions])
+
+    def array(values: Any, scale: Any = 1.0) -> Array:
+        values = np.array(values, dtype=float)
+        return np.ascontiguousarray((values.T * scale).T.astype(kind))
+
+    none, square = [0.0] * 3, np.zeros((3, 3))
+    J = np.array([motion.inertia_B for motion in motions])
+    moments, axes = np.linalg.eigh(J)
+    torque = unit**2 / size
+    ends = [[n * motion.steps for n in range(1, motion.samples + 1)] for motion in motions]
+    return Bodies(
+        J=array(J, 1 / size),
+        inverse=array(np.linalg.inv(J), size),
+        moments=array(moments, 1 / size),
+        axes=array(axes),
+        rotor=array([motion.rotor_momentum_B or none for motion in motions], unit / size),
+        body=array([motion.torque_B or none for motion in motions], torque),
+        world=array([motion.torque_W or none for motion in motions], torque),
+        damping=array([square if motion.damping is None else motion.damping for motion in motions], unit / size),
+        arm=array([motion.arm for motion in motions], torque),
+        orbit=array([motion.orbit or 0.0 for motion in motions], unit),
+        loaded=np.array([bool({*motion.features} - {"rotor"}) for motion in motions]),
+        q0=array([motion.exact["quaternion_wxyz"][0] for motion in motions]),
+        w0=array([motion.rates for motion in motions], unit),
+        half=kind(0.5),
+        none=kind(0.0),
+        unit=unit,
+        ends=np.concatenate(ends),
+        first=np.cumsum([0, *map(len, ends)]),
+    )
 
 
-def back(M: Array, v: Array) -> Array:
-    """Return M' v of matrices (3, 3, n) and vectors (3, n)."""
-    return (M * v[:, None]).sum(axis=0)
+class Rule(NamedTuple):
+    """A step: its kind, one of the constants below, and its numbers, each of which has a meaning for some kinds only.
+
+    They are rows A and weights b of a Runge-Kutta method, the time `at` of an implicit stage, the rates that turn the attitude,
+    whether it is turned by the exponential map, and how often a torque is corrected.
+    """
+
+    kind: int
+    A: Any
+    b: Any
+    at: Any
+    use: int
+    exact: bool
+    sweeps: int
 
 
-def multiply(A: Array, B: Array) -> Array:
-    """Return the products of matrices (3, 3, n)."""
-    return (A[:, :, None] * B[None]).sum(axis=1)
-
-
-def hat(w: Array) -> Array:
-    """Return the matrices (3, 3, n) of w x."""
-    none = 0 * w[0]
-    return np.stack([np.stack(row) for row in ((none, -w[2], w[1]), (w[2], none, -w[0]), (-w[1], w[0], none))])
-
-
-def product(p: Array, q: Array) -> Array:
-    """Return the products of quaternions (4, n)."""
-    return np.concatenate([[p[0] * q[0] - (p[1:] * q[1:]).sum(axis=0)], p[0] * q[1:] + q[0] * p[1:] + cross(p[1:], q[1:])])
-
-
-def matrix(q: Array) -> Array:
-    """Return the matrices (3, 3, n) of quaternions (4, n) of any norm."""
-    w, x, y, z = q / np.sqrt((q * q).sum(axis=0))
-    return np.stack([np.stack(row) for row in (
-        (w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        (2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)),
-        (2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z),
-    )])  # fmt: skip
-
-
-def exponential(turn: Array) -> Array:
-    """Return the quaternions (4, n) of rotation vectors (3, n)."""
-    angle = np.sqrt((turn * turn).sum(axis=0))
-    size = np.sinc(angle / (2 * np.pi)).astype(turn.dtype) / 2
-    return np.concatenate([np.cos(angle / 2)[None], size * turn])
-
-
-class Bodies:
-    """The equations of motions in one design, in units of their steps and largest moments."""
-
-    def __init__(self, motions: Sequence[Motion], attitude: str, variable: str, single: bool = False) -> None:
-        kind = np.float32 if single else np.float64
-        self.unit = np.array([motion.step for motion in motions])
-        size = np.array([np.linalg.eigvalsh(motion.inertia_B)[2] for motion in motions])
-        self.attitude, self.variable, self.n = attitude, variable, 4 if attitude == "quaternion" else 9
-
-        def gather(values: Any, scale: Any = 1.0) -> Array:
-            return (np.moveaxis(np.array(values, dtype=float), 0, -1) * scale).astype(kind)
-
-        none, square = [0.0] * 3, np.zeros((3, 3))
-        J = np.array([motion.inertia_B for motion in motions])
-        self.J, self.inverse = gather(J, 1 / size), gather(np.linalg.inv(J), size)
-        moments, axes = np.linalg.eigh(J)
-        self.moments, self.axes = gather(moments, 1 / size), gather(axes)
-        self.rotor = gather([motion.rotor_momentum_B or none for motion in motions], self.unit / size)
-        torque = self.unit**2 / size
-        self.body = gather([motion.torque_B or none for motion in motions], torque)
-        self.world = gather([motion.torque_W or none for motion in motions], torque)
-        self.damping = gather([square if motion.damping is None else motion.damping for motion in motions], self.unit / size)
-        self.arm = gather([motion.arm for motion in motions], torque)
-        self.orbit = gather([motion.orbit or 0.0 for motion in motions], self.unit)
-        self.q0 = gather([motion.exact["quaternion_wxyz"][0] for motion in motions])
-        self.w0 = gather([motion.rates for motion in motions], self.unit)
-
-    @property
-    def start(self) -> Array:
-        """The initial states (n + 3, motions)."""
-        R = matrix(self.q0)
-        return np.concatenate([self.q0 if self.n == 4 else R.reshape(9, -1), self.of_momentum(R, self.momentum(self.w0))])
-
-    def R(self, y: Array) -> Array:
-        """Return the matrices (3, 3, n) of states."""
-        return matrix(y[:4]) if self.n == 4 else y[:9].reshape(3, 3, -1)
-
-    def momentum(self, w: Array) -> Array:
-        """Return the momentum in body axes, with the rotor's momentum."""
-        return apply(self.J, w) + self.rotor
-
-    def of_momentum(self, R: Array, M: Array) -> Array:
-        """Return the variable of rotation from the momentum in body axes."""
-        v = M if "momentum" in self.variable else apply(self.inverse, M - self.rotor)
-        return apply(R, v) if "world" in self.variable else v
-
-    def rates(self, R: Array, v: Array) -> Array:
-        """Return the rates in body axes from the variable of rotation."""
-        v = back(R, v) if "world" in self.variable else v
-        return apply(self.inverse, v - self.rotor) if "momentum" in self.variable else v
-
-    def torque(self, t: Array, R: Array, w: Array) -> Array:
-        """Return the torques in body axes."""
-        out = self.body + back(R, self.world) - apply(self.damping, w) + cross(R[2], self.arm)
-        u = back(R, np.stack([np.cos(self.orbit * t), np.sin(self.orbit * t), 0 * t]))
-        return out + 3 * self.orbit**2 * cross(u, apply(self.J, u))
-
-    def turning(self, a: Array, w: Array) -> Array:
-        """Return the derivative of attitudes (4 or 9, n)."""
-        if self.n == 4:
-            return product(a, np.concatenate([0 * w[:1], w])) / 2
-        return multiply(a.reshape(3, 3, -1), hat(w)).reshape(9, -1)
-
-    def turned(self, a: Array, turn: Array) -> Array:
-        """Return attitudes (4 or 9, n) turned by rotation vectors (3, n) in body axes."""
-        q = exponential(turn)
-        return product(a, q) if self.n == 4 else multiply(a.reshape(3, 3, -1), matrix(q)).reshape(9, -1)
-
-    def change(self, t: Array, R: Array, v: Array, w: Array) -> Array:
-        """Return the derivative of the variable of rotation."""
-        T = self.torque(t, R, w)
-        if self.variable == "world momentum":
-            return apply(R, T)
-        if self.variable == "momentum":
-            return T + cross(v, w)
-        slope = apply(self.inverse, T + cross(self.momentum(w), w))
-        return apply(R, slope) if self.variable == "world rates" else slope
-
-    def __call__(self, t: Array, y: Array) -> Array:
-        """Return the derivative of states."""
-        R, v = self.R(y), y[self.n :]
-        w = self.rates(R, v)
-        return np.concatenate([self.turning(y[: self.n], w), self.change(t, R, v, w)])
-
-    def normalise(self, y: Array) -> Array:
-        """Return states with unit quaternions, or orthonormal matrices whose rows are made orthogonal in their order."""
-        if self.n == 4:
-            return np.concatenate([y[:4] / np.sqrt((y[:4] * y[:4]).sum(axis=0)), y[4:]])
-        x = y[:3] / np.sqrt((y[:3] * y[:3]).sum(axis=0))
-        z = cross(x, y[3:6])
-        z = z / np.sqrt((z * z).sum(axis=0))
-        return np.concatenate([x, cross(z, x), z, y[9:]])
-
-
-Next = Callable[[Bodies, Array, Array, Array, list[Array]], Array]
-"""From bodies, times (n,), states, step sizes (n,) and earlier states, the newest first, to the next states."""
-
-
-def _sum(y: Array, h: Array, weights: Sequence[float], slopes: Sequence[Array]) -> Array:
-    for a, k in zip(weights, slopes, strict=False):
-        y = y + (h * y.dtype.type(a)) * k if a else y
-    return y
-
-
-def tableau(
-    f: Bodies, t: Array, y: Array, h: Array, past: list[Array], A: Sequence[Sequence[float]], b: Sequence[float]
-) -> Array:
-    """Explicit Runge-Kutta methods."""
-    slopes: list[Array] = []
-    for row in ((), *A):
-        slopes.append(f(t + h * y.dtype.type(sum(row)), _sum(y, h, row, slopes)))
-    return _sum(y, h, b, slopes)
-
-
-def turned_tableau(
-    f: Bodies,
-    t: Array,
-    y: Array,
-    h: Array,
-    past: list[Array],
-    A: Sequence[Sequence[float]],
-    b: Sequence[float],
-    corrected: bool,
-) -> Array:
-    """Explicit Runge-Kutta methods with the exponential map; `corrected` (Munthe-Kaas) keeps the order above 2."""
-    changes, turns, none = list[Array](), list[Array](), 0 * y[f.n :]
-    for row in ((), *A):
-        turn, v = _sum(none, h, row, turns), _sum(y[f.n :], h, row, changes)
-        R = f.R(np.concatenate([f.turned(y[: f.n], turn), v]))
-        w, at = f.rates(R, v), t + h * y.dtype.type(sum(row))
-        changes.append(f.change(at, R, v, w))
-        across = cross(turn, w)
-        turns.append(w + across / 2 + cross(turn, across) / 12 if corrected else w)
-    return np.concatenate([f.turned(y[: f.n], _sum(none, h, b, turns)), _sum(y[f.n :], h, b, changes)])
-
-
-def semi_implicit(f: Bodies, t: Array, y: Array, h: Array, past: list[Array], use: str, exact: bool, sweeps: int = 1) -> Array:
-    """Rates with some corrections of their torque, then the attitude with old, new or mean rates."""
-    v, end = y[f.n :], y
-    for _ in range(sweeps):
-        end = np.concatenate([y[: f.n], v + h * f(t, end)[f.n :]])
-    R = f.R(y)
-    old, new = f.rates(R, v), f.rates(R, end[f.n :])
-    w = {"old": old, "new": new, "mean": (old + new) / 2}[use]
-    a = f.turned(y[: f.n], h * w) if exact else y[: f.n] + h * f.turning(y[: f.n], w)
-    return np.concatenate([a, end[f.n :]])
-
-
-def _solve(y: Array, function: Callable[[Array], Array]) -> Array:
-    """Return the fixed point of a function near y."""
-    for _ in range(60):
-        before, y = y, function(y)
-        if np.abs(y - before).max() <= 2 * np.finfo(y.dtype).eps * np.abs(y).max():
-            break
-    return y
-
-
-def implicit(f: Bodies, t: Array, y: Array, h: Array, past: list[Array], at: float) -> Array:
-    """Implicit Euler (at = 1) or the implicit midpoint rule (at = 1/2)."""
-    part = h * y.dtype.type(at)
-    stage = _solve(y, lambda stage: y + part * f(t + part, stage))
-    return y + (stage - y) / y.dtype.type(at)
-
-
-def trapezoid(f: Bodies, t: Array, y: Array, h: Array, past: list[Array]) -> Array:
-    """The trapezoidal rule."""
-    first = y + h / 2 * f(t, y)
-    return _solve(y, lambda new: first + h / 2 * f(t + h, new))
-
-
-def gauss(f: Bodies, t: Array, y: Array, h: Array, past: list[Array]) -> Array:
-    """Gauss's collocation of order 4."""
-    root = y.dtype.type(3**0.5 / 6)
-    low, high = (y.dtype.type(0.5) - root) * h, (y.dtype.type(0.5) + root) * h
-
-    def again(slopes: Array) -> Array:
-        a, b = slopes
-        return np.stack([f(t + low, y + h * (a / 4) + (low - h / 4) * b), f(t + high, y + (high - h / 4) * a + h * (b / 4))])
-
-    a, b = _solve(np.stack([f(t, y), f(t, y)]), again)
-    return y + h / 2 * (a + b)
-
-
-def adams(f: Bodies, t: Array, y: Array, h: Array, past: list[Array]) -> Array:
-    """Adams-Bashforth of order 2; the first step is explicit Euler."""
-    return y + h * f(t, y) if not past else y + h * (3 * f(t, y) - f(t - h, past[0])) / 2
-
-
+TABLEAU, TURNED, CORRECTED, SEMI_IMPLICIT, IMPLICIT, TRAPEZOID, GAUSS, ADAMS, SPLITTING, COMPOSED, SPLIT_TWICE, EXTRAPOLATED = (
+    range(12)
+)
+"""Kinds of steps: Runge-Kutta methods, on rotation vectors without and with corrections above order 2, ..."""
+OLD, NEW, MEAN = range(3)
+"""Rates that turn the attitude."""
 KICKS = 12
 """Number of iterations of a kick. Each multiplies the error by h D / 2, at most 0.03 here."""
+MOST = 60
+"""Largest number of iterations of an implicit step."""
 
 
-def splitting(f: Bodies, t: Array, y: Array, h: Array, past: list[Array]) -> Array:
-    """Half a kick, rotations about the principal axes 1, 2, 3, 2, 1, half a kick (Dullweber, Leimkuhler & McLachlan 1997)."""
-    a, R = y[: f.n], f.R(y)
-    M = _kick(f, t, R, y[f.n :] if f.variable == "momentum" else f.momentum(y[f.n :]), h / 2)
-    for i, part in ((0, h / 2), (1, h / 2), (2, h), (1, h / 2), (0, h / 2)):
-        axis = f.axes[:, i]
-        turn = part * (axis * (M - f.rotor)).sum(axis=0) / f.moments[i] * axis
-        a, M = f.turned(a, turn), back(matrix(exponential(turn)), M)
-    R = f.R(np.concatenate([a, M]))
-    return np.concatenate([a, f.of_momentum(R, _kick(f, t + h, R, M, h / 2))])
+@kernel
+def cross(a, b):
+    """Return the cross product of vectors."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-def _kick(f: Bodies, t: Array, R: Array, M: Array, h: Array) -> Array:
-    """The change of the momentum by torques at a fixed attitude, by the implicit midpoint rule: a step back undoes it."""
+@kernel
+def add(a, b):
+    """Return the sum of vectors."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@kernel
+def less(a, b):
+    """Return the difference of vectors."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@kernel
+def times(x, a):
+    """Return a vector times a number."""
+    return x * a[0], x * a[1], x * a[2]
+
+
+@kernel
+def dot(a, b):
+    """Return the product of vectors."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@kernel
+def rows(M):
+    """Return an array (3, 3) as nine numbers."""
+    return M[0, 0], M[0, 1], M[0, 2], M[1, 0], M[1, 1], M[1, 2], M[2, 0], M[2, 1], M[2, 2]
+
+
+@kernel
+def apply(M, v):
+    """Return M v of a matrix, nine numbers."""
+    return (
+        M[0] * v[0] + M[1] * v[1] + M[2] * v[2],
+        M[3] * v[0] + M[4] * v[1] + M[5] * v[2],
+        M[6] * v[0] + M[7] * v[1] + M[8] * v[2],
+    )
+
+
+@kernel
+def back(M, v):
+    """Return M' v of a matrix, nine numbers."""
+    return (
+        M[0] * v[0] + M[3] * v[1] + M[6] * v[2],
+        M[1] * v[0] + M[4] * v[1] + M[7] * v[2],
+        M[2] * v[0] + M[5] * v[1] + M[8] * v[2],
+    )
+
+
+@kernel
+def matrix(w, x, y, z):
+    """Return the matrix of a quaternion of any norm."""
+    size = math.sqrt(w * w + x * x + y * y + z * z)
+    w, x, y, z = w / size, x / size, y / size, z / size
+    xy, xz, yz, wx, wy, wz = x * y, x * z, y * z, w * x, w * y, w * z
+    a, b, c, d, e, f = xy - wz, xz + wy, xy + wz, yz - wx, xz - wy, yz + wx
+    return w * w + x * x - y * y - z * z, a + a, b + b, c + c, w * w - x * x + y * y - z * z, d + d, e + e, f + f, (
+        w * w - x * x - y * y + z * z
+    )  # fmt: skip
+
+
+@kernel
+def exponential(half, turn):
+    """Return the quaternion of a rotation vector."""
+    angle = math.sqrt(dot(turn, turn))
+    size = math.sin(half * angle) / angle if angle > 0 else half
+    return math.cos(half * angle), size * turn[0], size * turn[1], size * turn[2]
+
+
+@kernel
+def rotation(y):
+    """Return the matrix of a state, which need not be orthogonal."""
+    if len(y) == 7:
+        return matrix(y[0], y[1], y[2], y[3])
+    return y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[7], y[8]
+
+
+@kernel
+def variable_of(y):
+    """Return the variable of rotation of a state."""
+    n = len(y) - 3
+    return y[n], y[n + 1], y[n + 2]
+
+
+@kernel
+def put(out, v):
+    """Write the variable of rotation to a state."""
+    n = len(out) - 3
+    out[n], out[n + 1], out[n + 2] = v
+
+
+@kernel
+def momentum_of(f, i, w):
+    """Return the momentum in body axes, with the rotor's momentum."""
+    return add(apply(rows(f.J[i]), w), f.rotor[i])
+
+
+@kernel
+def of_momentum(f, i, variable, R, M):
+    """Return the variable of rotation from the momentum in body axes."""
+    v = M
+    if variable in (RATES, WORLD_RATES):
+        v = apply(rows(f.inverse[i]), less(M, f.rotor[i]))
+    return apply(R, v) if variable >= WORLD_RATES else v
+
+
+@kernel
+def rates_of(f, i, variable, R, v):
+    """Return the rates in body axes from the variable of rotation."""
+    if variable >= WORLD_RATES:
+        v = back(R, v)
+    return apply(rows(f.inverse[i]), less(v, f.rotor[i])) if variable in (MOMENTUM, WORLD_MOMENTUM) else v
+
+
+@kernel
+def torque(f, i, t, R, w):
+    """Return the torque in body axes."""
+    if not f.loaded[i]:
+        return f.none, f.none, f.none
+    T = less(add(back(R, f.world[i]), f.body[i]), apply(rows(f.damping[i]), w))
+    T = add(T, cross((R[6], R[7], R[8]), f.arm[i]))
+    n = f.orbit[i]
+    if n != 0:
+        c, s = math.cos(n * t), math.sin(n * t)
+        u = R[0] * c + R[3] * s, R[1] * c + R[4] * s, R[2] * c + R[5] * s
+        T = add(T, times(n * n + n * n + n * n, cross(u, apply(rows(f.J[i]), u))))
+    return T
+
+
+@kernel
+def change(f, i, variable, t, R, v, w):
+    """Return the derivative of the variable of rotation."""
+    T = torque(f, i, t, R, w)
+    if variable == WORLD_MOMENTUM:
+        return apply(R, T)
+    if variable == MOMENTUM:
+        return add(T, cross(v, w))
+    slope = apply(rows(f.inverse[i]), add(T, cross(momentum_of(f, i, w), w)))
+    return apply(R, slope) if variable == WORLD_RATES else slope
+
+
+@kernel
+def turning(f, y, w, out):
+    """Write the derivative of an attitude."""
+    if len(y) == 7:
+        a, b, c = times(f.half, w)
+        out[0] = -(y[1] * a + y[2] * b + y[3] * c)
+        out[1] = y[0] * a + y[2] * c - y[3] * b
+        out[2] = y[0] * b + y[3] * a - y[1] * c
+        out[3] = y[0] * c + y[1] * b - y[2] * a
+    else:
+        for k in (0, 3, 6):
+            out[k], out[k + 1], out[k + 2] = cross((y[k], y[k + 1], y[k + 2]), w)  # a row of R hat(w)
+
+
+@kernel
+def turned(f, y, turn, out):
+    """Write the attitude of a state, turned by a rotation vector in body axes."""
+    p, q, r, s = exponential(f.half, turn)
+    if len(y) == 7:
+        w, x, z, u = y[0], y[1], y[2], y[3]
+        out[0] = w * p - (x * q + z * r + u * s)
+        out[1] = w * q + p * x + z * s - u * r
+        out[2] = w * r + p * z + u * q - x * s
+        out[3] = w * s + p * u + x * r - z * q
+    else:
+        M = matrix(p, q, r, s)
+        for k in (0, 3, 6):
+            out[k], out[k + 1], out[k + 2] = back(M, (y[k], y[k + 1], y[k + 2]))
+
+
+@kernel
+def slope(f, i, variable, t, y, out):
+    """Write the derivative of a state."""
+    R, v = rotation(y), variable_of(y)
+    w = rates_of(f, i, variable, R, v)
+    turning(f, y, w, out)
+    put(out, change(f, i, variable, t, R, v, w))
+
+
+@kernel
+def normalise(y):
+    """Give a state a unit quaternion, or an orthonormal matrix whose rows are made orthogonal in their order."""
+    if len(y) == 7:
+        size = math.sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2] + y[3] * y[3])
+        for k in range(4):
+            y[k] /= size
+        return
+    x, second = (y[0], y[1], y[2]), (y[3], y[4], y[5])
+    size = math.sqrt(dot(x, x))
+    x = x[0] / size, x[1] / size, x[2] / size
+    z = cross(x, second)
+    size = math.sqrt(dot(z, z))
+    z = z[0] / size, z[1] / size, z[2] / size
+    y[0], y[1], y[2] = x
+    y[3], y[4], y[5] = cross(z, x)
+    y[6], y[7], y[8] = z
+
+
+@kernel
+def converged(new, old):
+    """Return whether two iterates of an implicit step agree, and write the new one over the old one."""
+    change, size = abs(new[0] - old[0]), abs(new[0])
+    for k in range(len(new)):
+        difference = abs(new[k] - old[k])
+        if not difference <= change:  # also nan
+            change = difference
+        size = max(size, abs(new[k]))
+        old[k] = new[k]
+    return change <= 2 * np.finfo(new.dtype).eps * size
+
+
+@kernel
+def tableau(f, i, variable, rule, t, y, h, out, work):
+    """Explicit Runge-Kutta methods."""
+    n = len(rule.b)
+    for s in range(n):
+        stage, at = work[n], t
+        stage[:] = y
+        for k in range(s):
+            if rule.A[s, k] != 0:
+                at += h * rule.A[s, k]
+                for j in range(len(y)):
+                    stage[j] += (h * rule.A[s, k]) * work[k, j]
+        slope(f, i, variable, at, stage, work[s])
+    out[:] = y
+    for k in range(n):
+        if rule.b[k] != 0:
+            for j in range(len(y)):
+                out[j] += (h * rule.b[k]) * work[k, j]
+
+
+@kernel
+def turned_tableau(f, i, variable, rule, t, y, h, out, work):
+    """Explicit Runge-Kutta methods with the exponential map; `CORRECTED` (Munthe-Kaas) keeps the order above 2.
+
+    A row of `work` has a rotation vector and a change of the variable of rotation; its last row is the stage.
+    """
+    n, start, none = len(rule.b), variable_of(y), times(y.dtype.type(0), variable_of(y))
+    for s in range(n + 1):
+        turn, v, at = none, start, t
+        for k in range(min(s, n)):
+            a = rule.A[s, k] if s < n else rule.b[k]
+            if a != 0:
+                turn = add(turn, times(h * a, (work[k, 0], work[k, 1], work[k, 2])))
+                v = add(v, times(h * a, (work[k, 3], work[k, 4], work[k, 5])))
+                at += h * a
+        if s == n:
+            turned(f, y, turn, out)
+            put(out, v)
+            return
+        stage = work[n]
+        turned(f, y, turn, stage)
+        R = rotation(stage)
+        w = rates_of(f, i, variable, R, v)
+        work[s, 3], work[s, 4], work[s, 5] = change(f, i, variable, at, R, v, w)
+        if rule.kind == CORRECTED:
+            across = cross(turn, w)
+            again = cross(turn, across)
+            twelfth = y.dtype.type(1 / 12)
+            w = add(add(w, times(f.half, across)), times(twelfth, again))
+        work[s, 0], work[s, 1], work[s, 2] = w
+
+
+@kernel
+def semi_implicit(f, i, variable, rule, t, y, h, out, work):
+    """Rates with some corrections of their torque, then the attitude with old, new or mean rates."""
+    end, k = work[0], work[1]
+    end[:] = y
+    start = variable_of(y)
+    for _ in range(rule.sweeps):
+        slope(f, i, variable, t, end, k)
+        put(end, add(start, times(h, variable_of(k))))
+    R = rotation(y)
+    w, new = rates_of(f, i, variable, R, start), rates_of(f, i, variable, R, variable_of(end))
+    if rule.use == NEW:
+        w = new
+    elif rule.use == MEAN:
+        w = times(f.half, add(w, new))
+    if rule.exact:
+        turned(f, y, times(h, w), out)
+    else:
+        turning(f, y, w, k)
+        for j in range(len(y) - 3):
+            out[j] = y[j] + h * k[j]
+    put(out, variable_of(end))
+
+
+@kernel
+def implicit(f, i, variable, at, t, y, h, out, work):
+    """Implicit Euler (at = 1) or the implicit midpoint rule (at = 1/2). It needs three rows of `work`."""
+    part, stage, new, k = h * at, work[0], work[1], work[2]
+    stage[:] = y
+    for _ in range(MOST):
+        slope(f, i, variable, t + part, stage, k)
+        for j in range(len(y)):
+            new[j] = y[j] + part * k[j]
+        if converged(new, stage):
+            break
+    for j in range(len(y)):
+        out[j] = y[j] + (stage[j] - y[j]) / at
+
+
+@kernel
+def trapezoid(f, i, variable, t, y, h, out, work):
+    """The trapezoidal rule."""
+    first, k, new, part = work[0], work[1], work[2], f.half * h
+    slope(f, i, variable, t, y, k)
+    for j in range(len(y)):
+        first[j] = y[j] + part * k[j]
+        out[j] = y[j]
+    for _ in range(MOST):
+        slope(f, i, variable, t + h, out, k)
+        for j in range(len(y)):
+            new[j] = first[j] + part * k[j]
+        if converged(new, out):
+            break
+
+
+@kernel
+def gauss(f, i, variable, t, y, h, out, work):
+    """Gauss's collocation of order 4."""
+    a, b, new, other, stage = work[0], work[1], work[2], work[3], work[4]
+    root, quarter = y.dtype.type(3**0.5 / 6), f.half * f.half * h
+    low, high = (f.half - root) * h, (f.half + root) * h
+    slope(f, i, variable, t, y, a)
+    b[:] = a
+    for _ in range(MOST):
+        for j in range(len(y)):
+            stage[j] = y[j] + quarter * a[j] + (low - quarter) * b[j]
+        slope(f, i, variable, t + low, stage, new)
+        for j in range(len(y)):
+            stage[j] = y[j] + (high - quarter) * a[j] + quarter * b[j]
+        slope(f, i, variable, t + high, stage, other)
+        done = converged(new, a)
+        if converged(other, b) and done:
+            break
+    for j in range(len(y)):
+        out[j] = y[j] + f.half * h * (a[j] + b[j])
+
+
+@kernel
+def adams(f, i, variable, n, t, y, before, h, out, work):
+    """Adams-Bashforth of order 2; the first step is explicit Euler."""
+    new, old = work[0], work[1]
+    slope(f, i, variable, t, y, new)
+    if n == 0:
+        for j in range(len(y)):
+            out[j] = y[j] + h * new[j]
+        return
+    slope(f, i, variable, t - h, before, old)
+    for j in range(len(y)):
+        out[j] = y[j] + h * (f.half * (new[j] + new[j] + new[j] - old[j]))
+
+
+@kernel
+def kick(f, i, t, R, M, h):
+    """Return the momentum changed by torques at a fixed attitude, by the implicit midpoint rule: a step back undoes it."""
     new = M
-    for _ in range(KICKS):
-        new = M + h * f.torque(t, R, apply(f.inverse, (M + new) / 2 - f.rotor))
+    for _ in range(KICKS if f.loaded[i] else 0):
+        w = apply(rows(f.inverse[i]), less(times(f.half, add(M, new)), f.rotor[i]))
+        new = add(M, times(h, torque(f, i, t, R, w)))
     return new
 
 
-def composed(f: Bodies, t: Array, y: Array, h: Array, past: list[Array], step: Next) -> Array:
+@kernel
+def splitting(f, i, variable, t, y, h, out):
+    """Half a kick, rotations about the principal axes 1, 2, 3, 2, 1, half a kick (Dullweber, Leimkuhler & McLachlan 1997)."""
+    out[:] = y
+    v, part = variable_of(y), f.half * h
+    M = kick(f, i, t, rotation(y), v if variable == MOMENTUM else momentum_of(f, i, v), part)
+    for k in (0, 1, 2, 1, 0):
+        axis = f.axes[i, 0, k], f.axes[i, 1, k], f.axes[i, 2, k]
+        angle = (h if k == 2 else part) * dot(axis, less(M, f.rotor[i])) / f.moments[i, k]
+        turn = times(angle, axis)
+        turned(f, out, turn, out)
+        p, q, r, s = exponential(f.half, turn)
+        M = back(matrix(p, q, r, s), M)
+    R = rotation(out)
+    put(out, of_momentum(f, i, variable, R, kick(f, i, t + h, R, M, part)))
+
+
+@kernel
+def composed(f, i, variable, kind, t, y, h, out, work):
     """A symmetric step of order 2, composed to order 4 (Yoshida 1990)."""
     outer = 1 / (2 - 2 ** (1 / 3))
+    out[:] = y
     for share in (outer, 1 - 2 * outer, outer):
-        part = h * y.dtype.type(share)
-        y, t = step(f, t, y, part, past), t + part
-    return y
+        part, state = h * y.dtype.type(share), work[3]
+        state[:] = out
+        if kind == COMPOSED:
+            implicit(f, i, variable, f.half, t, state, part, out, work)
+        else:
+            splitting(f, i, variable, t, state, part, out)
+        t += part
 
 
-def extrapolated(f: Bodies, t: Array, y: Array, h: Array, past: list[Array]) -> Array:
+@kernel
+def extrapolated(f, i, variable, t, y, h, out, work):
     """The implicit midpoint rule, extrapolated to order 4 from one and two steps."""
-    middle = partial(implicit, at=0.5)
-    half = middle(f, t, y, h / 2, past)
-    return (4 * middle(f, t + h / 2, half, h / 2, past) - middle(f, t, y, h, past)) / 3
+    one, half, part = work[3], work[4], f.half * h
+    implicit(f, i, variable, f.half, t, y, part, half, work)
+    implicit(f, i, variable, f.half, t, y, h, one, work)
+    implicit(f, i, variable, f.half, t + part, half, part, out, work)
+    for j in range(len(y)):
+        out[j] = (y.dtype.type(4) * out[j] - one[j]) / y.dtype.type(3)
+
+
+@kernel
+def step(f, i, variable, rule, n, h, y, before, out, work):  # one branch for each kind
+    """Write the state after the step of number n from state y; `before` is the state before it."""
+    t = h * y.dtype.type(n)
+    if rule.kind == TABLEAU:
+        tableau(f, i, variable, rule, t, y, h, out, work)
+    elif rule.kind in (TURNED, CORRECTED):
+        turned_tableau(f, i, variable, rule, t, y, h, out, work)
+    elif rule.kind == SEMI_IMPLICIT:
+        semi_implicit(f, i, variable, rule, t, y, h, out, work)
+    elif rule.kind == IMPLICIT:
+        implicit(f, i, variable, rule.at, t, y, h, out, work)
+    elif rule.kind == TRAPEZOID:
+        trapezoid(f, i, variable, t, y, h, out, work)
+    elif rule.kind == GAUSS:
+        gauss(f, i, variable, t, y, h, out, work)
+    elif rule.kind == ADAMS:
+        adams(f, i, variable, n, t, y, before, h, out, work)
+    elif rule.kind == SPLITTING:
+        splitting(f, i, variable, t, y, h, out)
+    elif rule.kind == EXTRAPOLATED:
+        extrapolated(f, i, variable, t, y, h, out, work)
+    else:
+        composed(f, i, variable, rule.kind, t, y, h, out, work)
+
+
+@entry
+def begin(f, variable, y):
+    """Write the initial states y (motions, 7 or 12)."""
+    for i in range(len(y)):
+        q = f.q0[i]
+        R = matrix(q[0], q[1], q[2], q[3])
+        if y.shape[1] == 7:
+            for k in range(4):
+                y[i, k] = q[k]
+        else:
+            for k in range(9):
+                y[i, k] = R[k]
+        put(y[i], of_momentum(f, i, variable, R, momentum_of(f, i, (f.w0[i, 0], f.w0[i, 1], f.w0[i, 2]))))
+
+
+@entry
+def advance(f, variable, rule, normalised, parts, first, last, y, before, R, w):
+    """Take the steps from `first` on, before `last`, in each motion up to its last sample. Write the samples before each step.
+
+    A step is a `parts`-th of 0.1 rad. States y and `before`, a step earlier, are (motions, 7 or 12), and the samples R, with
+    unit norm, and w are (samples, ...), as in `Bodies`.
+    """
+    h, size = y.dtype.type(1 / parts), y.shape[1]
+    work, new = np.zeros((6, size), y.dtype), np.zeros(size, y.dtype)
+    for i in range(len(y)):
+        state, at = y[i], f.first[i]
+        while at < f.first[i + 1] and f.ends[at] * parts < first:
+            at += 1
+        for n in range(first, last):
+            if at < f.first[i + 1] and f.ends[at] * parts == n:
+                new[:] = state
+                normalise(new)
+                matrix_of, rates = rotation(new), rates_of(f, i, variable, rotation(state), variable_of(state))
+                for k in range(9):
+                    R[at, k // 3, k % 3] = matrix_of[k]
+                for k in range(3):
+                    w[at, k] = rates[k]
+                at += 1
+            if at == f.first[i + 1]:
+                break
+            step(f, i, variable, rule, n, h, state, before[i], new, work)
+            if normalised:
+                normalise(new)
+            before[i] = state
+            state[:] = new
+
+
+def _rule(
+    kind: int,
+    A: Sequence[Sequence[float]] = (),
+    b: Sequence[float] = (),
+    at: float = 0.0,
+    use: int = OLD,
+    exact: bool = False,
+    sweeps: int = 1,
+) -> Rule:
+    table = np.zeros((len(b), len(b)))
+    for i, row in enumerate(A):
+        table[i + 1, : len(row)] = row
+    return Rule(kind, table, np.array(b, dtype=float), at, use, exact, sweeps)
 
 
 RK4 = (((0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)), (1 / 6, 1 / 3, 1 / 3, 1 / 6))
 EIGHTHS = (((1 / 3,), (-1 / 3, 1.0), (1.0, -1.0, 1.0)), (1 / 8, 3 / 8, 3 / 8, 1 / 8))
 """Rows of A, and b, of Runge and Kutta's rules of order 4: the classical one, and the rule of three eighths."""
-STEPS: dict[int, dict[str, Next]] = {
+STEPS: dict[int, dict[str, Rule]] = {
     1: {
-        "explicit Euler": partial(tableau, A=(), b=(1.0,)),
-        "explicit Euler with the exponential map": partial(semi_implicit, use="old", exact=True),
-        "semi-implicit Euler": partial(semi_implicit, use="new", exact=False),
-        "semi-implicit Euler with the exponential map": partial(semi_implicit, use="new", exact=True),
-        "semi-implicit Euler with an implicit torque": partial(semi_implicit, use="new", exact=False, sweeps=20),
-        "mean rates": partial(semi_implicit, use="mean", exact=True),
-        "implicit Euler": partial(implicit, at=1.0),
+        "explicit Euler": _rule(TABLEAU, (), (1.0,)),
+        "explicit Euler with the exponential map": _rule(SEMI_IMPLICIT, use=OLD, exact=True),
+        "semi-implicit Euler": _rule(SEMI_IMPLICIT, use=NEW),
+        "semi-implicit Euler with the exponential map": _rule(SEMI_IMPLICIT, use=NEW, exact=True),
+        "semi-implicit Euler with an implicit torque": _rule(SEMI_IMPLICIT, use=NEW, sweeps=20),
+        "mean rates": _rule(SEMI_IMPLICIT, use=MEAN, exact=True),
+        "implicit Euler": _rule(IMPLICIT, at=1.0),
     },
     2: {
-        "explicit midpoint": partial(tableau, A=((0.5,),), b=(0.0, 1.0)),
-        "Heun": partial(tableau, A=((1.0,),), b=(0.5, 0.5)),
-        "Ralston": partial(tableau, A=((2 / 3,),), b=(0.25, 0.75)),
-        "explicit midpoint with the exponential map": partial(turned_tableau, A=((0.5,),), b=(0.0, 1.0), corrected=False),
-        "Heun with the exponential map": partial(turned_tableau, A=((1.0,),), b=(0.5, 0.5), corrected=False),
-        "implicit midpoint": partial(implicit, at=0.5),
-        "trapezoid": trapezoid,
-        "Adams-Bashforth": adams,
-        "splitting": splitting,
+        "explicit midpoint": _rule(TABLEAU, ((0.5,),), (0.0, 1.0)),
+        "Heun": _rule(TABLEAU, ((1.0,),), (0.5, 0.5)),
+        "Ralston": _rule(TABLEAU, ((2 / 3,),), (0.25, 0.75)),
+        "explicit midpoint with the exponential map": _rule(TURNED, ((0.5,),), (0.0, 1.0)),
+        "Heun with the exponential map": _rule(TURNED, ((1.0,),), (0.5, 0.5)),
+        "implicit midpoint": _rule(IMPLICIT, at=0.5),
+        "trapezoid": _rule(TRAPEZOID),
+        "Adams-Bashforth": _rule(ADAMS),
+        "splitting": _rule(SPLITTING),
     },
     4: {
-        "RK4": partial(tableau, A=RK4[0], b=RK4[1]),
-        "3/8": partial(tableau, A=EIGHTHS[0], b=EIGHTHS[1]),
-        "RK4 on rotation vectors (Munthe-Kaas)": partial(turned_tableau, A=RK4[0], b=RK4[1], corrected=True),
-        "Gauss": gauss,
-        "composed implicit midpoint": partial(composed, step=partial(implicit, at=0.5)),
-        "composed splitting": partial(composed, step=splitting),
-        "extrapolated implicit midpoint": extrapolated,
+        "RK4": _rule(TABLEAU, *RK4),
+        "3/8": _rule(TABLEAU, *EIGHTHS),
+        "RK4 on rotation vectors (Munthe-Kaas)": _rule(CORRECTED, *RK4),
+        "Gauss": _rule(GAUSS),
+        "composed implicit midpoint": _rule(COMPOSED),
+        "composed splitting": _rule(SPLIT_TWICE),
+        "extrapolated implicit midpoint": _rule(EXTRAPOLATED),
     },
 }
 """The steps by their order."""
@@ -363,29 +688,33 @@ class Design:
         parts = [self.step, self.attitude, self.variable, *["never normalised"] * (not self.normalised)]
         return ", ".join([*parts, *["single"] * self.single])
 
-    def run(
-        self, motions: Sequence[Motion], parts: int, after: Callable[[Array], Array] | None = None
-    ) -> Iterator[tuple[Array, Array]]:
-        """Yield attitudes (samples, 3, 3) and rates (samples, 3) of each motion, by steps of 0.1 rad over `parts`.
+    def samples(self, bodies: Bodies, parts: int, after: Callable[[Array], Array] | None = None) -> tuple[Array, Array]:
+        """Return attitudes (n, 3, 3) and rates (n, 3), rad/s, of all samples, by steps of 0.1 rad over `parts`.
 
         `after` is a habit: it changes rates (3, motions), rad/s, after each step. The variable of rotation is then the rates.
         """
-        f, step = Bodies(motions, self.attitude, self.variable, self.single), STEPS[self.order][self.step]
-        ends = [[n * motion.steps * parts for n in range(1, motion.samples + 1)] for motion in motions]
-        y, past, states = f.start, list[Array](), list[Array]()
-        h = np.full(len(motions), 1 / parts, dtype=y.dtype)
+        kind, count = bodies.J.dtype.type, len(bodies.unit)
+        rule = STEPS[self.order][self.step]
+        rule = rule._replace(A=rule.A.astype(kind), b=rule.b.astype(kind), at=kind(rule.at))
+        y = np.zeros((count, 7 if self.attitude == "quaternion" else 12), kind)
+        before, R, w = np.zeros_like(y), np.empty((len(bodies.ends), 3, 3)), np.empty((len(bodies.ends), 3))
+        variable, end = VARIABLES.index(self.variable), int(bodies.ends.max()) * parts
         with np.errstate(all="ignore"):
-            for n in range(max(map(max, ends))):
-                states.append(y)
-                new = step(f, h * y.dtype.type(n), y, h, past)
-                past, y = [y], f.normalise(new) if self.normalised else new
+            begin(bodies, variable, y)
+            for first, last in [(0, end + 1)] if after is None else [(n, n + 1) for n in range(end + 1)]:
+                advance(bodies, variable, rule, self.normalised, parts, first, last, y, before, R, w)
                 if after is not None:
-                    y[f.n :] = after(y[f.n :] / f.unit) * f.unit
-            states.append(y)
-            R = np.array([f.R(f.normalise(state)) for state in states], dtype=float)
-            w = np.array([f.rates(f.R(state), state[f.n :]) for state in states], dtype=float) / f.unit
-        for i, rows in enumerate(ends):
-            yield R[rows, :, :, i], w[rows, :, i]
+                    y[:, -3:] = (after(y[:, -3:].T / bodies.unit) * bodies.unit).T
+        return R, w / np.repeat(bodies.unit, np.diff(bodies.first))[:, None]
+
+    def run(
+        self, motions: Sequence[Motion], parts: int, after: Callable[[Array], Array] | None = None
+    ) -> Iterator[tuple[Array, Array]]:
+        """Yield attitudes (samples, 3, 3) and rates (samples, 3) of each motion; see `samples`."""
+        bodies = gather(motions, self.single)
+        R, w = self.samples(bodies, parts, after)
+        for a, b in pairwise(bodies.first):
+            yield R[a:b], w[a:b]
 
 
 def designs(order: int, single: bool = False) -> list[Design]:
