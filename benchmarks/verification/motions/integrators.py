@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from conservative.attitude import Array
-from conservative.kernels import entry, kernel
+from conservative.kernels import entry, kernel, small
 
 from .motion import Motion
 
@@ -27,29 +27,23 @@ RATES, MOMENTUM, WORLD_RATES, WORLD_MOMENTUM = range(4)
 """Places in `VARIABLES`."""
 
 
-class Bodies(NamedTuple):
-    """The bodies and loads of motions, arrays (motions, ...) in units of their steps and largest moments, and their starts.
+J, INVERSE, DAMPING, AXES, MOMENTS, ROTOR, BODY, WORLD, ARM, QUATERNION, RATES_0, ORBIT, LOADED, HALF, NONE, SIZE = np.cumsum(
+    [0, 9, 9, 9, 9, 3, 3, 3, 3, 3, 4, 3, 1, 1, 1, 1]
+).tolist()
+"""Places of the numbers of a motion: matrices by rows, vectors, the start, whether there is any load, 1/2 and 0.
 
-    `loaded` says whether there is any load. `half` and `none` are 1/2 and 0 in the precision of the others, and `unit` the steps
-    (motions,) in s. `ends` has the numbers of steps of 0.1 rad after which there are samples, of one motion after the other; those
-    of a motion begin at its number in `first` (motions + 1,).
+Kernels get them in one array, because an array for each is copied at each call, which takes longer than the sums.
+"""
+
+
+class Bodies(NamedTuple):
+    """The numbers of motions (motions, `SIZE`) in units of their steps and largest moments.
+
+    `unit` are the steps (motions,), s. `ends` are the numbers of steps of 0.1 rad after which there are samples, of one motion
+    after the other; those of motion i begin at first[i].
     """
 
-    J: Any
-    inverse: Any
-    moments: Any
-    axes: Any
-    rotor: Any
-    body: Any
-    world: Any
-    damping: Any
-    arm: Any
-    orbit: Any
-    loaded: Any
-    q0: Any
-    w0: Any
-    half: Any
-    none: Any
+    numbers: Any
     unit: Any
     ends: Any
     first: Any
@@ -57,39 +51,38 @@ class Bodies(NamedTuple):
 
 def gather(motions: Sequence[Motion], single: bool = False) -> Bodies:
     """Return the bodies of motions, in single or double precision."""
-    kind = np.float32 if single else np.float64
     unit = np.array([motion.step for motion in motions])
-    size = np.array([np.linalg.eigvalsh(motion.inertia_B)[2] for motion in motions])
-
-    def array(values: Any, scale: Any = 1.0) -> Array:
-        values = np.array(values, dtype=float)
-        return np.ascontiguousarray((values.T * scale).T.astype(kind))
-
-    none, square = [0.0] * 3, np.zeros((3, 3))
-    J = np.array([motion.inertia_B for motion in motions])
-    moments, axes = np.linalg.eigh(J)
-    torque = unit**2 / size
     ends = [[n * motion.steps for n in range(1, motion.samples + 1)] for motion in motions]
-    return Bodies(
-        J=array(J, 1 / size),
-        inverse=array(np.linalg.inv(J), size),
-        moments=array(moments, 1 / size),
-        axes=array(axes),
-        rotor=array([motion.rotor_momentum_B or none for motion in motions], unit / size),
-        body=array([motion.torque_B or none for motion in motions], torque),
-        world=array([motion.torque_W or none for motion in motions], torque),
-        damping=array([square if motion.damping is None else motion.damping for motion in motions], unit / size),
-        arm=array([motion.arm for motion in motions], torque),
-        orbit=array([motion.orbit or 0.0 for motion in motions], unit),
-        loaded=np.array([bool({*motion.features} - {"rotor"}) for motion in motions]),
-        q0=array([motion.exact["quaternion_wxyz"][0] for motion in motions]),
-        w0=array([motion.rates for motion in motions], unit),
-        half=kind(0.5),
-        none=kind(0.0),
-        unit=unit,
-        ends=np.concatenate(ends),
-        first=np.cumsum([0, *map(len, ends)]),
+    numbers = np.array([_numbers(motion) for motion in motions]).astype(np.float32 if single else np.float64)
+    return Bodies(numbers, unit, np.concatenate(ends), np.cumsum([0, *map(len, ends)]))
+
+
+def _numbers(motion: Motion) -> Array:
+    """Return the numbers of a motion, in their places."""
+    inertia, unit, none = np.array(motion.inertia_B), motion.step, np.zeros(3)
+    moments, axes = np.linalg.eigh(inertia)
+    size = moments[2]
+    torque, momentum = unit**2 / size, unit / size
+    loaded = bool({*motion.features} - {"rotor"})
+    parts = (
+        (J, inertia / size),
+        (INVERSE, np.linalg.inv(inertia) * size),
+        (DAMPING, np.array(np.zeros((3, 3)) if motion.damping is None else motion.damping) * momentum),
+        (AXES, axes),
+        (MOMENTS, moments / size),
+        (ROTOR, np.array(motion.rotor_momentum_B or none) * momentum),
+        (BODY, np.array(motion.torque_B or none) * torque),
+        (WORLD, np.array(motion.torque_W or none) * torque),
+        (ARM, np.array(motion.arm) * torque),
+        (QUATERNION, motion.exact["quaternion_wxyz"][0]),
+        (RATES_0, np.array(motion.rates) * unit),
+        (ORBIT, np.array([(motion.orbit or 0.0) * unit, loaded, 0.5, 0.0])),
     )
+    out = np.zeros(SIZE)
+    for place, values in parts:
+        flat = np.ravel(values)
+        out[place : place + len(flat)] = flat
+    return out
 
 
 class Rule(NamedTuple):
@@ -120,43 +113,49 @@ MOST = 60
 """Largest number of iterations of an implicit step."""
 
 
-@kernel
+@small
 def cross(a, b):
     """Return the cross product of vectors."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@kernel
+@small
 def add(a, b):
     """Return the sum of vectors."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
-@kernel
+@small
 def less(a, b):
     """Return the difference of vectors."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
-@kernel
+@small
 def times(x, a):
     """Return a vector times a number."""
     return x * a[0], x * a[1], x * a[2]
 
 
-@kernel
+@small
 def dot(a, b):
     """Return the product of vectors."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@kernel
-def rows(M):
-    """Return an array (3, 3) as nine numbers."""
-    return M[0, 0], M[0, 1], M[0, 2], M[1, 0], M[1, 1], M[1, 2], M[2, 0], M[2, 1], M[2, 2]
+@small
+def row(f, i):
+    """Return the vector at a place."""
+    return f[i], f[i + 1], f[i + 2]
 
 
-@kernel
+@small
+def rows(f, i):
+    """Return the matrix at a place as nine numbers."""
+    return f[i], f[i + 1], f[i + 2], f[i + 3], f[i + 4], f[i + 5], f[i + 6], f[i + 7], f[i + 8]
+
+
+@small
 def apply(M, v):
     """Return M v of a matrix, nine numbers."""
     return (
@@ -166,7 +165,7 @@ def apply(M, v):
     )
 
 
-@kernel
+@small
 def back(M, v):
     """Return M' v of a matrix, nine numbers."""
     return (
@@ -176,7 +175,7 @@ def back(M, v):
     )
 
 
-@kernel
+@small
 def matrix(w, x, y, z):
     """Return the matrix of a quaternion of any norm."""
     size = math.sqrt(w * w + x * x + y * y + z * z)
@@ -196,7 +195,7 @@ def exponential(half, turn):
     return math.cos(half * angle), size * turn[0], size * turn[1], size * turn[2]
 
 
-@kernel
+@small
 def rotation(y):
     """Return the matrix of a state, which need not be orthogonal."""
     if len(y) == 7:
@@ -204,67 +203,67 @@ def rotation(y):
     return y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[7], y[8]
 
 
-@kernel
+@small
 def variable_of(y):
     """Return the variable of rotation of a state."""
     n = len(y) - 3
     return y[n], y[n + 1], y[n + 2]
 
 
-@kernel
+@small
 def put(out, v):
     """Write the variable of rotation to a state."""
     n = len(out) - 3
     out[n], out[n + 1], out[n + 2] = v
 
 
-@kernel
-def momentum_of(f, i, w):
+@small
+def momentum_of(f, w):
     """Return the momentum in body axes, with the rotor's momentum."""
-    return add(apply(rows(f.J[i]), w), f.rotor[i])
+    return add(apply(rows(f, J), w), row(f, ROTOR))
 
 
-@kernel
-def of_momentum(f, i, variable, R, M):
+@small
+def of_momentum(f, variable, R, M):
     """Return the variable of rotation from the momentum in body axes."""
     v = M
     if variable in (RATES, WORLD_RATES):
-        v = apply(rows(f.inverse[i]), less(M, f.rotor[i]))
+        v = apply(rows(f, INVERSE), less(M, row(f, ROTOR)))
     return apply(R, v) if variable >= WORLD_RATES else v
 
 
-@kernel
-def rates_of(f, i, variable, R, v):
+@small
+def rates_of(f, variable, R, v):
     """Return the rates in body axes from the variable of rotation."""
     if variable >= WORLD_RATES:
         v = back(R, v)
-    return apply(rows(f.inverse[i]), less(v, f.rotor[i])) if variable in (MOMENTUM, WORLD_MOMENTUM) else v
+    return apply(rows(f, INVERSE), less(v, row(f, ROTOR))) if variable in (MOMENTUM, WORLD_MOMENTUM) else v
 
 
 @kernel
-def torque(f, i, t, R, w):
+def torque(f, t, R, w):
     """Return the torque in body axes."""
-    if not f.loaded[i]:
-        return f.none, f.none, f.none
-    T = less(add(back(R, f.world[i]), f.body[i]), apply(rows(f.damping[i]), w))
-    T = add(T, cross((R[6], R[7], R[8]), f.arm[i]))
-    n = f.orbit[i]
+    if f[LOADED] == 0:
+        return f[NONE], f[NONE], f[NONE]
+    T = less(add(back(R, row(f, WORLD)), row(f, BODY)), apply(rows(f, DAMPING), w))
+    T = add(T, cross((R[6], R[7], R[8]), row(f, ARM)))
+    n = f[ORBIT]
     if n != 0:
         c, s = math.cos(n * t), math.sin(n * t)
         u = R[0] * c + R[3] * s, R[1] * c + R[4] * s, R[2] * c + R[5] * s
-        T = add(T, times(n * n + n * n + n * n, cross(u, apply(rows(f.J[i]), u))))
+        T = add(T, times(n * n + n * n + n * n, cross(u, apply(rows(f, J), u))))
     return T
 
 
 @kernel
-def change(f, i, variable, t, R, v, w):
+def change(f, variable, t, R, v, w):
     """Return the derivative of the variable of rotation."""
-    T = torque(f, i, t, R, w)
+    T = torque(f, t, R, w)
     if variable == WORLD_MOMENTUM:
         return apply(R, T)
     if variable == MOMENTUM:
         return add(T, cross(v, w))
-    slope = apply(rows(f.inverse[i]), add(T, cross(momentum_of(f, i, w), w)))
+    slope = apply(rows(f, INVERSE), add(T, cross(momentum_of(f, w), w)))
     return apply(R, slope) if variable == WORLD_RATES else slope
 
 
@@ -272,7 +271,7 @@ def change(f, i, variable, t, R, v, w):
 def turning(f, y, w, out):
     """Write the derivative of an attitude."""
     if len(y) == 7:
-        a, b, c = times(f.half, w)
+        a, b, c = times(f[HALF], w)
         out[0] = -(y[1] * a + y[2] * b + y[3] * c)
         out[1] = y[0] * a + y[2] * c - y[3] * b
         out[2] = y[0] * b + y[3] * a - y[1] * c
@@ -285,7 +284,7 @@ def turning(f, y, w, out):
 @kernel
 def turned(f, y, turn, out):
     """Write the attitude of a state, turned by a rotation vector in body axes."""
-    p, q, r, s = exponential(f.half, turn)
+    p, q, r, s = exponential(f[HALF], turn)
     if len(y) == 7:
         w, x, z, u = y[0], y[1], y[2], y[3]
         out[0] = w * p - (x * q + z * r + u * s)
@@ -299,12 +298,12 @@ def turned(f, y, turn, out):
 
 
 @kernel
-def slope(f, i, variable, t, y, out):
+def slope(f, variable, t, y, out):
     """Write the derivative of a state."""
     R, v = rotation(y), variable_of(y)
-    w = rates_of(f, i, variable, R, v)
+    w = rates_of(f, variable, R, v)
     turning(f, y, w, out)
-    put(out, change(f, i, variable, t, R, v, w))
+    put(out, change(f, variable, t, R, v, w))
 
 
 @kernel
@@ -340,7 +339,7 @@ def converged(new, old):
 
 
 @kernel
-def tableau(f, i, variable, rule, t, y, h, out, work):
+def tableau(f, variable, rule, t, y, h, out, work):
     """Explicit Runge-Kutta methods."""
     n = len(rule.b)
     for s in range(n):
@@ -351,7 +350,7 @@ def tableau(f, i, variable, rule, t, y, h, out, work):
                 at += h * rule.A[s, k]
                 for j in range(len(y)):
                     stage[j] += (h * rule.A[s, k]) * work[k, j]
-        slope(f, i, variable, at, stage, work[s])
+        slope(f, variable, at, stage, work[s])
     out[:] = y
     for k in range(n):
         if rule.b[k] != 0:
@@ -360,7 +359,7 @@ def tableau(f, i, variable, rule, t, y, h, out, work):
 
 
 @kernel
-def turned_tableau(f, i, variable, rule, t, y, h, out, work):
+def turned_tableau(f, variable, rule, t, y, h, out, work):
     """Explicit Runge-Kutta methods with the exponential map; `CORRECTED` (Munthe-Kaas) keeps the order above 2.
 
     A row of `work` has a rotation vector and a change of the variable of rotation; its last row is the stage.
@@ -381,31 +380,31 @@ def turned_tableau(f, i, variable, rule, t, y, h, out, work):
         stage = work[n]
         turned(f, y, turn, stage)
         R = rotation(stage)
-        w = rates_of(f, i, variable, R, v)
-        work[s, 3], work[s, 4], work[s, 5] = change(f, i, variable, at, R, v, w)
+        w = rates_of(f, variable, R, v)
+        work[s, 3], work[s, 4], work[s, 5] = change(f, variable, at, R, v, w)
         if rule.kind == CORRECTED:
             across = cross(turn, w)
             again = cross(turn, across)
             twelfth = y.dtype.type(1 / 12)
-            w = add(add(w, times(f.half, across)), times(twelfth, again))
+            w = add(add(w, times(f[HALF], across)), times(twelfth, again))
         work[s, 0], work[s, 1], work[s, 2] = w
 
 
 @kernel
-def semi_implicit(f, i, variable, rule, t, y, h, out, work):
+def semi_implicit(f, variable, rule, t, y, h, out, work):
     """Rates with some corrections of their torque, then the attitude with old, new or mean rates."""
     end, k = work[0], work[1]
     end[:] = y
     start = variable_of(y)
     for _ in range(rule.sweeps):
-        slope(f, i, variable, t, end, k)
+        slope(f, variable, t, end, k)
         put(end, add(start, times(h, variable_of(k))))
     R = rotation(y)
-    w, new = rates_of(f, i, variable, R, start), rates_of(f, i, variable, R, variable_of(end))
+    w, new = rates_of(f, variable, R, start), rates_of(f, variable, R, variable_of(end))
     if rule.use == NEW:
         w = new
     elif rule.use == MEAN:
-        w = times(f.half, add(w, new))
+        w = times(f[HALF], add(w, new))
     if rule.exact:
         turned(f, y, times(h, w), out)
     else:
@@ -416,12 +415,12 @@ def semi_implicit(f, i, variable, rule, t, y, h, out, work):
 
 
 @kernel
-def implicit(f, i, variable, at, t, y, h, out, work):
+def implicit(f, variable, at, t, y, h, out, work):
     """Implicit Euler (at = 1) or the implicit midpoint rule (at = 1/2). It needs three rows of `work`."""
     part, stage, new, k = h * at, work[0], work[1], work[2]
     stage[:] = y
     for _ in range(MOST):
-        slope(f, i, variable, t + part, stage, k)
+        slope(f, variable, t + part, stage, k)
         for j in range(len(y)):
             new[j] = y[j] + part * k[j]
         if converged(new, stage):
@@ -431,15 +430,15 @@ def implicit(f, i, variable, at, t, y, h, out, work):
 
 
 @kernel
-def trapezoid(f, i, variable, t, y, h, out, work):
+def trapezoid(f, variable, t, y, h, out, work):
     """The trapezoidal rule."""
-    first, k, new, part = work[0], work[1], work[2], f.half * h
-    slope(f, i, variable, t, y, k)
+    first, k, new, part = work[0], work[1], work[2], f[HALF] * h
+    slope(f, variable, t, y, k)
     for j in range(len(y)):
         first[j] = y[j] + part * k[j]
         out[j] = y[j]
     for _ in range(MOST):
-        slope(f, i, variable, t + h, out, k)
+        slope(f, variable, t + h, out, k)
         for j in range(len(y)):
             new[j] = first[j] + part * k[j]
         if converged(new, out):
@@ -447,70 +446,70 @@ def trapezoid(f, i, variable, t, y, h, out, work):
 
 
 @kernel
-def gauss(f, i, variable, t, y, h, out, work):
+def gauss(f, variable, t, y, h, out, work):
     """Gauss's collocation of order 4."""
     a, b, new, other, stage = work[0], work[1], work[2], work[3], work[4]
-    root, quarter = y.dtype.type(3**0.5 / 6), f.half * f.half * h
-    low, high = (f.half - root) * h, (f.half + root) * h
-    slope(f, i, variable, t, y, a)
+    root, quarter = y.dtype.type(3**0.5 / 6), f[HALF] * f[HALF] * h
+    low, high = (f[HALF] - root) * h, (f[HALF] + root) * h
+    slope(f, variable, t, y, a)
     b[:] = a
     for _ in range(MOST):
         for j in range(len(y)):
             stage[j] = y[j] + quarter * a[j] + (low - quarter) * b[j]
-        slope(f, i, variable, t + low, stage, new)
+        slope(f, variable, t + low, stage, new)
         for j in range(len(y)):
             stage[j] = y[j] + (high - quarter) * a[j] + quarter * b[j]
-        slope(f, i, variable, t + high, stage, other)
+        slope(f, variable, t + high, stage, other)
         done = converged(new, a)
         if converged(other, b) and done:
             break
     for j in range(len(y)):
-        out[j] = y[j] + f.half * h * (a[j] + b[j])
+        out[j] = y[j] + f[HALF] * h * (a[j] + b[j])
 
 
 @kernel
-def adams(f, i, variable, n, t, y, before, h, out, work):
+def adams(f, variable, n, t, y, before, h, out, work):
     """Adams-Bashforth of order 2; the first step is explicit Euler."""
     new, old = work[0], work[1]
-    slope(f, i, variable, t, y, new)
+    slope(f, variable, t, y, new)
     if n == 0:
         for j in range(len(y)):
             out[j] = y[j] + h * new[j]
         return
-    slope(f, i, variable, t - h, before, old)
+    slope(f, variable, t - h, before, old)
     for j in range(len(y)):
-        out[j] = y[j] + h * (f.half * (new[j] + new[j] + new[j] - old[j]))
+        out[j] = y[j] + h * (f[HALF] * (new[j] + new[j] + new[j] - old[j]))
 
 
 @kernel
-def kick(f, i, t, R, M, h):
+def kick(f, t, R, M, h):
     """Return the momentum changed by torques at a fixed attitude, by the implicit midpoint rule: a step back undoes it."""
     new = M
-    for _ in range(KICKS if f.loaded[i] else 0):
-        w = apply(rows(f.inverse[i]), less(times(f.half, add(M, new)), f.rotor[i]))
-        new = add(M, times(h, torque(f, i, t, R, w)))
+    for _ in range(KICKS if f[LOADED] != 0 else 0):
+        w = apply(rows(f, INVERSE), less(times(f[HALF], add(M, new)), row(f, ROTOR)))
+        new = add(M, times(h, torque(f, t, R, w)))
     return new
 
 
 @kernel
-def splitting(f, i, variable, t, y, h, out):
+def splitting(f, variable, t, y, h, out):
     """Half a kick, rotations about the principal axes 1, 2, 3, 2, 1, half a kick (Dullweber, Leimkuhler & McLachlan 1997)."""
     out[:] = y
-    v, part = variable_of(y), f.half * h
-    M = kick(f, i, t, rotation(y), v if variable == MOMENTUM else momentum_of(f, i, v), part)
+    v, part = variable_of(y), f[HALF] * h
+    M = kick(f, t, rotation(y), v if variable == MOMENTUM else momentum_of(f, v), part)
     for k in (0, 1, 2, 1, 0):
-        axis = f.axes[i, 0, k], f.axes[i, 1, k], f.axes[i, 2, k]
-        angle = (h if k == 2 else part) * dot(axis, less(M, f.rotor[i])) / f.moments[i, k]
+        axis = f[AXES + k], f[AXES + 3 + k], f[AXES + 6 + k]
+        angle = (h if k == 2 else part) * dot(axis, less(M, row(f, ROTOR))) / f[MOMENTS + k]
         turn = times(angle, axis)
         turned(f, out, turn, out)
-        p, q, r, s = exponential(f.half, turn)
+        p, q, r, s = exponential(f[HALF], turn)
         M = back(matrix(p, q, r, s), M)
     R = rotation(out)
-    put(out, of_momentum(f, i, variable, R, kick(f, i, t + h, R, M, part)))
+    put(out, of_momentum(f, variable, R, kick(f, t + h, R, M, part)))
 
 
 @kernel
-def composed(f, i, variable, kind, t, y, h, out, work):
+def composed(f, variable, kind, t, y, h, out, work):
     """A symmetric step of order 2, composed to order 4 (Yoshida 1990)."""
     outer = 1 / (2 - 2 ** (1 / 3))
     out[:] = y
@@ -518,66 +517,66 @@ def composed(f, i, variable, kind, t, y, h, out, work):
         part, state = h * y.dtype.type(share), work[3]
         state[:] = out
         if kind == COMPOSED:
-            implicit(f, i, variable, f.half, t, state, part, out, work)
+            implicit(f, variable, f[HALF], t, state, part, out, work)
         else:
-            splitting(f, i, variable, t, state, part, out)
+            splitting(f, variable, t, state, part, out)
         t += part
 
 
 @kernel
-def extrapolated(f, i, variable, t, y, h, out, work):
+def extrapolated(f, variable, t, y, h, out, work):
     """The implicit midpoint rule, extrapolated to order 4 from one and two steps."""
-    one, half, part = work[3], work[4], f.half * h
-    implicit(f, i, variable, f.half, t, y, part, half, work)
-    implicit(f, i, variable, f.half, t, y, h, one, work)
-    implicit(f, i, variable, f.half, t + part, half, part, out, work)
+    one, half, part = work[3], work[4], f[HALF] * h
+    implicit(f, variable, f[HALF], t, y, part, half, work)
+    implicit(f, variable, f[HALF], t, y, h, one, work)
+    implicit(f, variable, f[HALF], t + part, half, part, out, work)
     for j in range(len(y)):
         out[j] = (y.dtype.type(4) * out[j] - one[j]) / y.dtype.type(3)
 
 
 @kernel
-def step(f, i, variable, rule, n, h, y, before, out, work):  # one branch for each kind
+def step(f, variable, rule, n, h, y, before, out, work):  # one branch for each kind
     """Write the state after the step of number n from state y; `before` is the state before it."""
     t = h * y.dtype.type(n)
     if rule.kind == TABLEAU:
-        tableau(f, i, variable, rule, t, y, h, out, work)
+        tableau(f, variable, rule, t, y, h, out, work)
     elif rule.kind in (TURNED, CORRECTED):
-        turned_tableau(f, i, variable, rule, t, y, h, out, work)
+        turned_tableau(f, variable, rule, t, y, h, out, work)
     elif rule.kind == SEMI_IMPLICIT:
-        semi_implicit(f, i, variable, rule, t, y, h, out, work)
+        semi_implicit(f, variable, rule, t, y, h, out, work)
     elif rule.kind == IMPLICIT:
-        implicit(f, i, variable, rule.at, t, y, h, out, work)
+        implicit(f, variable, rule.at, t, y, h, out, work)
     elif rule.kind == TRAPEZOID:
-        trapezoid(f, i, variable, t, y, h, out, work)
+        trapezoid(f, variable, t, y, h, out, work)
     elif rule.kind == GAUSS:
-        gauss(f, i, variable, t, y, h, out, work)
+        gauss(f, variable, t, y, h, out, work)
     elif rule.kind == ADAMS:
-        adams(f, i, variable, n, t, y, before, h, out, work)
+        adams(f, variable, n, t, y, before, h, out, work)
     elif rule.kind == SPLITTING:
-        splitting(f, i, variable, t, y, h, out)
+        splitting(f, variable, t, y, h, out)
     elif rule.kind == EXTRAPOLATED:
-        extrapolated(f, i, variable, t, y, h, out, work)
+        extrapolated(f, variable, t, y, h, out, work)
     else:
-        composed(f, i, variable, rule.kind, t, y, h, out, work)
+        composed(f, variable, rule.kind, t, y, h, out, work)
 
 
 @entry
-def begin(f, variable, y):
+def begin(numbers, variable, y):
     """Write the initial states y (motions, 7 or 12)."""
     for i in range(len(y)):
-        q = f.q0[i]
-        R = matrix(q[0], q[1], q[2], q[3])
+        f = numbers[i]
+        R = matrix(f[QUATERNION], f[QUATERNION + 1], f[QUATERNION + 2], f[QUATERNION + 3])
         if y.shape[1] == 7:
             for k in range(4):
-                y[i, k] = q[k]
+                y[i, k] = f[QUATERNION + k]
         else:
             for k in range(9):
                 y[i, k] = R[k]
-        put(y[i], of_momentum(f, i, variable, R, momentum_of(f, i, (f.w0[i, 0], f.w0[i, 1], f.w0[i, 2]))))
+        put(y[i], of_momentum(f, variable, R, momentum_of(f, row(f, RATES_0))))
 
 
 @entry
-def advance(f, variable, rule, normalised, parts, first, last, y, before, R, w):
+def advance(bodies, variable, rule, normalised, parts, first, last, y, before, R, w):
     """Take the steps from `first` on, before `last`, in each motion up to its last sample. Write the samples before each step.
 
     A step is a `parts`-th of 0.1 rad. States y and `before`, a step earlier, are (motions, 7 or 12), and the samples R, with
@@ -586,22 +585,22 @@ def advance(f, variable, rule, normalised, parts, first, last, y, before, R, w):
     h, size = y.dtype.type(1 / parts), y.shape[1]
     work, new = np.zeros((6, size), y.dtype), np.zeros(size, y.dtype)
     for i in range(len(y)):
-        state, at = y[i], f.first[i]
-        while at < f.first[i + 1] and f.ends[at] * parts < first:
+        f, state, at = bodies.numbers[i], y[i], bodies.first[i]
+        while at < bodies.first[i + 1] and bodies.ends[at] * parts < first:
             at += 1
         for n in range(first, last):
-            if at < f.first[i + 1] and f.ends[at] * parts == n:
+            if at < bodies.first[i + 1] and bodies.ends[at] * parts == n:
                 new[:] = state
                 normalise(new)
-                matrix_of, rates = rotation(new), rates_of(f, i, variable, rotation(state), variable_of(state))
+                matrix_of, rates = rotation(new), rates_of(f, variable, rotation(state), variable_of(state))
                 for k in range(9):
                     R[at, k // 3, k % 3] = matrix_of[k]
                 for k in range(3):
                     w[at, k] = rates[k]
                 at += 1
-            if at == f.first[i + 1]:
+            if at == bodies.first[i + 1]:
                 break
-            step(f, i, variable, rule, n, h, state, before[i], new, work)
+            step(f, variable, rule, n, h, state, before[i], new, work)
             if normalised:
                 normalise(new)
             before[i] = state
@@ -693,14 +692,14 @@ class Design:
 
         `after` is a habit: it changes rates (3, motions), rad/s, after each step. The variable of rotation is then the rates.
         """
-        kind, count = bodies.J.dtype.type, len(bodies.unit)
+        kind, count = bodies.numbers.dtype.type, len(bodies.unit)
         rule = STEPS[self.order][self.step]
         rule = rule._replace(A=rule.A.astype(kind), b=rule.b.astype(kind), at=kind(rule.at))
         y = np.zeros((count, 7 if self.attitude == "quaternion" else 12), kind)
         before, R, w = np.zeros_like(y), np.empty((len(bodies.ends), 3, 3)), np.empty((len(bodies.ends), 3))
         variable, end = VARIABLES.index(self.variable), int(bodies.ends.max()) * parts
         with np.errstate(all="ignore"):
-            begin(bodies, variable, y)
+            begin(bodies.numbers, variable, y)
             for first, last in [(0, end + 1)] if after is None else [(n, n + 1) for n in range(end + 1)]:
                 advance(bodies, variable, rule, self.normalised, parts, first, last, y, before, R, w)
                 if after is not None:

@@ -1,22 +1,21 @@
 """The search for motions: bodies and starts of each family are drawn from a seed, and those are taken that show its mistakes.
 
-The published motions are the catalogue, which `python -m conservative.benchmarks.verification.motions.search` writes again. Any
-other seed gives fresh motions, one of each family, with other bodies and starts, so that nobody tunes to the published ones.
+A seed gives fresh motions, one of each family, with other bodies and starts than the published ones, so that nobody tunes to
+these. The motions of `catalogue.toml` were drawn by the same functions: 40 of each family and length, from one generator.
+
+A seed gives the same motions on every machine. Numbers of a motion have at most four digits, and the solution is computed in
+integers. Only a choice or a tolerance that round-off decides could differ.
 """
 
 from __future__ import annotations
 
-import json
-import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache, partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-import conservative
 from conservative.attitude import Array, to_quaternion
 from conservative.errors import BadInput, IntegrationFailed
 from conservative.grid import Grid
@@ -30,8 +29,6 @@ from .signatures import signatures
 
 ENOUGH = 20.0
 """Smallest factor by which the mistakes of a family should exceed what a program of order 2 may err at |w| h = 0.01."""
-PUBLISHED, DRAWN = 20261127, 40
-"""Seed of the published motions, and how many motions of each family and length were drawn for them."""
 TRIES = 3
 """How many fresh motions of each family and length are drawn."""
 LENGTHS = ((1, 1), (1, 2), (1, 4), (2, 4), (4, 4), (4, 5))
@@ -176,7 +173,11 @@ FAMILIES: dict[str, tuple[str, tuple[str, ...], dict[str, Any]]] = {
     "gyroscopic_term": ("a generic body in principal axes", GYRO, {"tilt": False}),
     "products": ("a generic body in axes that are not principal", (*TENSOR, *GYRO), {}),
     "products_flat": ("a flat body in axes that are not principal", (*TENSOR, *GYRO), {"body": "flat"}),
-    "start_at_identity": ("a generic body that starts with the unit quaternion", (*GYRO, *TENSOR, WORLD[0], *READ), {"attitude": False}),
+    "start_at_identity": (
+        "a generic body that starts with the unit quaternion",
+        (*GYRO, *TENSOR, WORLD[0], *READ),
+        {"attitude": False},
+    ),
     "world_tensor": ("a generic body in a generic attitude", (*WORLD, *READ), {}),
     "readings": ("a ball: quaternions, axes and signs alone", ("transposed", "order xyzw"), {"body": "ball", "tilt": False}),
     "half_step": ("a steady turn: times alone", ("half a step late",), {"tilt": False, "rate": _about_z}),
@@ -184,47 +185,99 @@ FAMILIES: dict[str, tuple[str, tuple[str, ...], dict[str, Any]]] = {
     "normalisation": ("rates that change fast, in principal axes", ORDER, {"tilt": False}),
     "separatrix": ("a start on the separatrix", (*GYRO, *WORLD), {"body": "ordered", "tilt": False, "rate": _separatrix}),
     "separatrix_turned": ("the same in turned axes", (*GYRO, *TENSOR), {"body": "ordered", "rate": _separatrix}),
-    "around_smallest": ("near the intermediate axis, around the smallest", GYRO,
-                        {"body": "ordered", "tilt": False, "rate": partial(_separatrix, side=0.9)}),
-    "around_largest": ("near the intermediate axis, around the largest", GYRO,
-                       {"body": "ordered", "tilt": False, "rate": partial(_separatrix, side=1.1)}),
+    "around_smallest": (
+        "near the intermediate axis, around the smallest",
+        GYRO,
+        {"body": "ordered", "tilt": False, "rate": partial(_separatrix, side=0.9)},
+    ),
+    "around_largest": (
+        "near the intermediate axis, around the largest",
+        GYRO,
+        {"body": "ordered", "tilt": False, "rate": partial(_separatrix, side=1.1)},
+    ),
     "nearly_oblate": ("two moments that are nearly equal, the third larger", (*GYRO, *WORLD), {"body": "oblate"}),
     "nearly_prolate": ("two moments that are nearly equal, the third smaller", (*GYRO, *WORLD), {"body": "prolate"}),
     "flat": ("a flat body: the largest moment is nearly the sum of the others", GYRO, {"body": "flat", "tilt": False}),
     "rod": ("a rod about its long axis and across", GYRO, {"body": "rod"}),
     "tiny": ("moments of 1e-9 kg m^2", ("smallest moments", *GYRO), {"size": 1e-9, "tilt": False}),
     "tiny_turned": ("moments of 1e-12 kg m^2, products of inertia", ("smallest moments", *GYRO), {"size": 1e-12}),
-    "tiny_fast": ("moments of 1e-7 kg m^2 at 300 rad/s", ("smallest moments", "rate limit 100"), {"size": 1e-7, "speed": 300.0}),
+    "tiny_fast": (
+        "moments of 1e-7 kg m^2 at 300 rad/s",
+        ("smallest moments", "rate limit 100"),
+        {"size": 1e-7, "speed": 300.0},
+    ),
     "huge": ("moments of 1e9 kg m^2", (*GYRO, *TENSOR), {"size": 1e9, "speed": 0.3}),
     "slow": ("1e-3 rad/s: damping and sleep", ("damping 0.01", "damping 0.05", "sleep"), {"speed": 1e-3}),
     "very_slow": ("1e-5 rad/s: damping and sleep", ("damping 0.01", "damping 0.05", "sleep"), {"speed": 1e-5, "tilt": False}),
-    "slow_turn": ("a steady turn at 0.01 rad/s", ("damping 0.01", "damping 0.05", "sleep"), {"speed": 0.01, "rate": _about_z, "tilt": False}),
+    "slow_turn": (
+        "a steady turn at 0.01 rad/s",
+        ("damping 0.01", "damping 0.05", "sleep"),
+        {"speed": 0.01, "rate": _about_z, "tilt": False},
+    ),
     "walking_pace": ("0.1 rad/s: damping", ("damping 0.01", "damping 0.05"), {"speed": 0.1}),
     "fast": ("1000 rad/s: limits of the rate", ("rate limit 100",), {"speed": 1000.0}),
-    "fast_turn": ("a steady turn at 150 rad/s", ("rate limit 100", "half a step late"), {"speed": 150.0, "rate": _about_z, "tilt": False}),
+    "fast_turn": (
+        "a steady turn at 150 rad/s",
+        ("rate limit 100", "half a step late"),
+        {"speed": 150.0, "rate": _about_z, "tilt": False},
+    ),
     "half_turn": ("the scalar part of the quaternion passes 0", ("transposed", "order xyzw"), {"attitude": _through_zero}),
     "half_turn_slow": ("the same at 0.02 rad/s", ("transposed", "damping 0.01"), {"attitude": _through_zero, "speed": 0.02}),
     "rotor": ("a rotor in a generic direction", ("without the rotor", "sign of the rotor"), {"rotor": 0.5}),
-    "rotor_turned": ("a rotor, starting from the unit quaternion", ("without the rotor", "sign of the rotor", "no gyroscopic term"),
-                     {"rotor": 1.0, "attitude": False}),
+    "rotor_turned": (
+        "a rotor, starting from the unit quaternion",
+        ("without the rotor", "sign of the rotor", "no gyroscopic term"),
+        {"rotor": 1.0, "attitude": False},
+    ),
     "rotor_dominates": ("a rotor with most of the momentum", ("without the rotor", "sign of the rotor"), {"rotor": 20.0}),
-    "rotor_slow": ("a satellite with a wheel, at 1e-3 rad/s", ("without the rotor", "sign of the rotor", "sleep"),
-                   {"rotor": 2.0, "size": 100.0, "speed": 1e-3}),
+    "rotor_slow": (
+        "a satellite with a wheel, at 1e-3 rad/s",
+        ("without the rotor", "sign of the rotor", "sleep"),
+        {"rotor": 2.0, "size": 100.0, "speed": 1e-3},
+    ),
     "torque_in_body": ("a constant torque in body axes", ("axes of the torque", "without the torque"), {"torque": "torque_B"}),
-    "torque_in_world": ("a constant torque in world axes", ("axes of the torque", "sign of the torque"), {"torque": "torque_W"}),
-    "torque_strong": ("a strong torque in world axes on a flat body", ("axes of the torque", "no gyroscopic term"),
-                      {"torque": "torque_W", "body": "flat"}),
-    "torque_and_rotor": ("a torque in body axes and a rotor", ("axes of the torque", "sign of the rotor"),
-                         {"torque": "torque_B", "rotor": 0.5}),
-    "damped": ("damping that differs along the axes", ("without the damping", "no gyroscopic term"), {"damping": 0.5, "tilt": False}),
-    "damped_and_driven": ("damping against a torque in world axes", ("without the damping", "axes of the torque"),
-                          {"damping": 0.5, "torque": "torque_W"}),
-    "heavy": ("a heavy body about a fixed point", ("without the field", "sign of the field", "no gyroscopic term"), {"arm": 1.0}),
+    "torque_in_world": (
+        "a constant torque in world axes",
+        ("axes of the torque", "sign of the torque"),
+        {"torque": "torque_W"},
+    ),
+    "torque_strong": (
+        "a strong torque in world axes on a flat body",
+        ("axes of the torque", "no gyroscopic term"),
+        {"torque": "torque_W", "body": "flat"},
+    ),
+    "torque_and_rotor": (
+        "a torque in body axes and a rotor",
+        ("axes of the torque", "sign of the rotor"),
+        {"torque": "torque_B", "rotor": 0.5},
+    ),
+    "damped": (
+        "damping that differs along the axes",
+        ("without the damping", "no gyroscopic term"),
+        {"damping": 0.5, "tilt": False},
+    ),
+    "damped_and_driven": (
+        "damping against a torque in world axes",
+        ("without the damping", "axes of the torque"),
+        {"damping": 0.5, "torque": "torque_W"},
+    ),
+    "heavy": (
+        "a heavy body about a fixed point",
+        ("without the field", "sign of the field", "no gyroscopic term"),
+        {"arm": 1.0},
+    ),
     "heavy_fast": ("a heavy fast top", ("without the field", "sign of the field"), {"arm": 0.2, "speed": 30.0}),
-    "orbit": ("a satellite in a circular orbit", ("without the field", "turning of the field"), {"orbit": 0.5, "size": 100.0, "speed": 2e-3}),
-    "orbit_flat": ("a flat satellite in a circular orbit", ("without the field", "sign of the field"),
-                   {"orbit": 0.7, "size": 100.0, "speed": 1.5e-3, "body": "flat"}),
-}  # fmt: skip
+    "orbit": (
+        "a satellite in a circular orbit",
+        ("without the field", "turning of the field"),
+        {"orbit": 0.5, "size": 100.0, "speed": 2e-3},
+    ),
+    "orbit_flat": (
+        "a flat satellite in a circular orbit",
+        ("without the field", "sign of the field"),
+        {"orbit": 0.7, "size": 100.0, "speed": 1.5e-3, "body": "flat"},
+    ),
+}
 """What each family is, the mistakes that it should show, and the arguments of `Random.motion`."""
 LONGER: dict[str, int] = {
     **dict.fromkeys(("half_turn", "half_turn_slow", "products_flat", "huge", "fast_turn", "rotor_slow", "tiny_turned"), 2),
@@ -233,41 +286,6 @@ LONGER: dict[str, int] = {
     **dict.fromkeys(("nearly_prolate", "torque_in_world", "very_slow", "rotor_dominates", "orbit_flat", "heavy_fast"), 4),
 }
 """The first of `LENGTHS` that is tried: motions that are longer than a mistake needs show more of it."""
-BRICK: dict[str, Any] = {"about": "the brick of Krenk and Nielsen near its intermediate axis", "inertia": [13, 5, 10, 0, 0, 0],
-         "quaternion": [1, 0, 0, 0], "rates": [0, 0.05, 10], "step": 0.01, "steps": 4, "samples": 5}  # fmt: skip
-
-
-def _golden(row: Array) -> dict[str, Any]:
-    """Return the start of a row of golden.csv as a motion."""
-    J, moment, q, L = row[:3], row[3:6], row[7:11], row[11:14]
-    size, pace, keys = float(np.linalg.norm(moment)), float(np.linalg.norm(L / J)), dict[str, Any]()
-    if size:
-        weight = digits([size**2 / (0.01 * J.min() * GRAVITY)])[0]
-        keys = {"weight": weight, "com_B": (moment / weight).tolist()}
-        pace = max(pace, (size / float(np.median(J))) ** 0.5)
-    return {"about": "a start of the golden vectors for engine authors", "inertia": [*J.tolist(), 0, 0, 0],
-            "quaternion": q.tolist(), "rates": (L / J).tolist(), "step": digits([0.1 / pace], 2)[0], "steps": 2, "samples": 4,
-            **keys}  # fmt: skip
-
-
-def catalogue(names: Sequence[str] = ()) -> Iterator[Motion]:
-    """Yield the motions of the catalogue, found again; `names` are the families to search, by default all.
-
-    All families share one generator, so that those before are drawn, too, and searched as long as their motions are not known.
-    """
-    path = Path(conservative.__file__).parent / "references/for_engine_authors/golden.csv"
-    table = np.loadtxt(path, delimiter=",", skiprows=1)
-    for name, keys in {"brick_flip": BRICK, **{f"golden_{i}": _golden(table[i]) for i in (0, 1, 4, 9)}}.items():
-        yield replace(Motion(name, **keys), step=_shorten([Motion(name, **keys)])[0].step)
-    random = Random(PUBLISHED)
-    for name, (about, targets, options) in FAMILIES.items():
-        for length in LENGTHS[LONGER.get(name, 0) :]:
-            motions = _draw(random, name, about, length, options, DRAWN)
-            factors = _factors(motions, [targets] * len(motions))
-            best = int(np.argmax(factors))
-            if factors[best] >= ENOUGH:
-                break
-        yield motions[best]
 
 
 @cache
@@ -300,12 +318,7 @@ def choose(seed: int) -> list[Motion]:
     for i in range(len(LENGTHS)):
         for _ in range(TRIES):
             left = [name for name in FAMILIES if i >= LONGER.get(name, 0) and best.get(name, (0.0,))[0] < ENOUGH]
-            drawn = list[Motion]()
-            for name in left:
-                about, _, options = FAMILIES[name]
-                while not (motions := _draw(random[name], name, about, LENGTHS[i], options, 1, seed)):
-                    pass
-                drawn += motions
+            drawn = [_draw(random[name], name, LENGTHS[i], seed) for name in left]
             for motion, factor in zip(drawn, _factors(drawn, [FAMILIES[name][1] for name in left]), strict=True):
                 if motion.name not in best or factor > best[motion.name][0]:
                     best[motion.name] = factor, motion
@@ -326,18 +339,12 @@ def confirm(motion: Motion) -> float:
     return off
 
 
-def _draw(
-    random: Random,
-    name: str,
-    about: str,
-    length: tuple[int, int],
-    options: dict[str, Any],
-    count: int,
-    seed: int | None = None,
-) -> list[Motion]:
-    """Return some motions of a family, without bodies that cannot exist."""
-    drawn = [Motion(name, about, **random.motion(**options), steps=length[0], samples=length[1], seed=seed) for _ in range(count)]
-    return _shorten([motion for motion in drawn if _exists(motion)])
+def _draw(random: Random, name: str, length: tuple[int, int], seed: int) -> Motion:
+    """Return the next motion of a family whose body can exist."""
+    about, _, options = FAMILIES[name]
+    while not _exists(motion := Motion(name, about, **random.motion(**options), steps=length[0], samples=length[1], seed=seed)):
+        pass
+    return _shorten(motion)
 
 
 def _exists(motion: Motion) -> bool:
@@ -367,14 +374,12 @@ def _factors(motions: Sequence[Motion], targets: Sequence[Sequence[str]]) -> lis
     return [min(factor(i, name) for name in names) for i, names in enumerate(targets)]
 
 
-def _shorten(motions: Sequence[Motion]) -> list[Motion]:
-    """Return motions with solutions in double precision, whose step is at most 0.1 rad at their largest rate."""
-    out = []
-    for motion in motions:
-        fastest = float(np.linalg.norm(_solve(motion)["w_WB_B"], axis=1).max())
-        out.append(replace(motion, step=digits([min(motion.step, 0.1 / fastest)], 2)[0]))
-        out[-1].__dict__["exact"] = _solve(out[-1])  # it suffices for the choice
-    return out
+def _shorten(motion: Motion) -> Motion:
+    """Return the motion with its solution in double precision, and a step of at most 0.1 rad at its largest rate."""
+    fastest = float(np.linalg.norm(_solve(motion)["w_WB_B"], axis=1).max())
+    shorter = replace(motion, step=digits([min(motion.step, 0.1 / fastest)], 2)[0])
+    shorter.__dict__["exact"] = _solve(shorter)  # it suffices for the choice
+    return shorter
 
 
 def _solve(motion: Motion) -> dict[str, Array]:
@@ -383,21 +388,3 @@ def _solve(motion: Motion) -> dict[str, Array]:
     L = w @ motion.inertia_B + (motion.rotor_momentum_B or (0, 0, 0))
     E = (w * (w @ motion.inertia_B)).sum(axis=1) / 2 + R[:, 2] @ motion.arm
     return dict(zip(SAMPLE, (R, to_quaternion(R), w, w, E, (R @ L[..., None])[..., 0]), strict=True))
-
-
-def render(motion: Motion) -> str:
-    """Return a motion as a table of the catalogue."""
-    keys = {key: value for key, value in vars(motion).items() if key not in ("name", "exact", "scene") and value is not None}
-    return "\n".join([f"[{motion.name}]", *(f"{key} = {json.dumps(value)}" for key, value in keys.items()), ""])
-
-
-def main() -> None:
-    """Write the catalogue to stdout."""
-    print(f"# Written by python -m {__spec__.name}; SI units, see `Motion`.\n")
-    for motion in catalogue():
-        print(render(motion), flush=True)
-        print(motion.name, motion.steps, motion.samples, file=sys.stderr)
-
-
-if __name__ == "__main__":
-    main()
