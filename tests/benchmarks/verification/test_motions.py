@@ -1,13 +1,9 @@
-"""Motions as files: every digit by a second solution, tolerances, and the tests of references/motions in each language."""
+"""Motions as files: every digit by a second solution, tolerances, and signatures. `test_rotation_tests.py` runs the tests."""
 
-import contextlib
 import csv
 import hashlib
-import importlib.util
 import json
 import math
-import re
-import subprocess
 from itertools import product
 
 import mpmath
@@ -28,14 +24,12 @@ from conservative.references.collocation import collocate
 from conservative.reports.cli.main import main
 
 from ...sampling import sampled
-from .motions_engines.methods import METHODS
-from .motions_engines.run import LANGUAGES, MOTIONS, missing, run
+from .motions_engines.run import MOTIONS
 from .right_programs import right_programs
-from .wrong_programs import wrong_programs
 
 CATALOGUE = {motion.name: motion for motion in load()}
 FILES = {name: json.loads((MOTIONS / f"{name}.json").read_text()) for name in CATALOGUE}
-RIGHT, WRONG = right_programs(), wrong_programs()
+RIGHT = right_programs()
 slow = pytest.mark.slow
 
 
@@ -243,145 +237,6 @@ def test_order_one_allows_what_order_two_does_not():
                 assert any(each[name] > two[name] for name in programs.QUANTITIES)
 
 
-def needs(language):
-    return pytest.param(language, marks=[pytest.mark.skipif(bool(missing(language)), reason=str(missing(language)))])
-
-
-RK2 = METHODS["explicit midpoint"][1]
-ALL = [needs(language) for language in LANGUAGES]
-"""In Python, a run takes seconds: wrong programs in this process test the same file."""
-EXPLAINS = re.compile(r'"(.+)" explains (\d+) of them')
-
-
-def summary(lines):
-    """Return the number of failing motions, the mistakes of the summary with their numbers of motions, and its other lines."""
-    (at,) = (i for i, line in enumerate(lines) if line.endswith("motions failed"))
-    explained = [EXPLAINS.fullmatch(line) for line in lines[at + 1 :]]
-    return (
-        int(lines[at].partition(" ")[0]),
-        {each[1]: int(each[2]) for each in explained if each},
-        [line for line, each in zip(lines[at + 1 :], explained, strict=True) if not each],
-    )
-
-
-@pytest.mark.parametrize("language", sampled(ALL, leave=["Python"]))
-def test_right_program_passes(language, tmp_path):
-    assert run(language, tmp_path, "", RK2, 2) == ["0 of 48 motions failed"]
-
-
-@pytest.mark.parametrize("language", sampled(ALL, leave=["Python"]))
-def test_mistake_is_named_by_the_summary(language, tmp_path):
-    """Two turns about one axis pass."""
-    lines = run(language, tmp_path, "wrong side", RK2, 2)
-    assert summary(lines) == (46, {"wrong side": 46}, [])
-    assert re.search(r"\w+: (attitude|rates|energy|momentum) error [\d.e+-]+, tolerance [\d.e+-]+$", lines[0])
-
-
-@pytest.mark.parametrize("language", [ALL[0], *(pytest.param(each.values[0], marks=[*each.marks, slow]) for each in ALL[1:])])
-def test_lower_order_than_declared_is_measured(language, tmp_path):
-    failing, explained, rest = summary(run(language, tmp_path, "", METHODS["explicit Euler"][1], 2))
-    assert failing >= 40
-    assert explained == {}
-    assert rest[0] == "this program has order 1.0, 2 was declared"
-
-
-def test_right_program_above_a_tolerance_passes_with_a_note(tmp_path, monkeypatch):
-    """With two per cent of the tolerances motions are above, and all errors fall as h^2."""
-    lines = run("C", tmp_path, "", RK2, 2, share=0.02)
-    assert summary(lines)[0] == 0
-    assert len(lines) >= 10
-    assert all(re.search(r" % above the tolerance, falls as h\^2\.\d: right$", line) for line in lines[:-1])
-
-
-def planted(language):
-    """C runs all mistakes; the other languages do with --all, Python, where a run takes seconds, one in five."""
-    for i, mistake in enumerate(PLANTED):
-        few = language == "Python" and i % 5
-        yield pytest.param(language, mistake, marks=[] if language == "C" else [pytest.mark.attack if few else slow])
-
-
-PLANTED = [
-    "R I for R I R'", "attitude by normalisation", "axes of the torque", "damping 0.01", "damping 0.05",
-    "diagonal gyroscopic term", "half a step late", "inertia in world axes", "inertia of the start",
-    "no gyroscopic term + damping 0.05", "no products of inertia", "order xyzw", "rate limit 100", "reversed rates",
-    "sign of the field", "sign of the gyroscopic term", "sign of the products of inertia", "sign of the rotor",
-    "sign of the torque", "sleep", "smallest moments", "stale rates", "transposed", "turning of the field",
-    "without the damping", "without the field", "without the rotor", "without the torque", "world rates",
-]  # fmt: skip
-"""Mistakes of the engines in all languages."""
-ALSO = ["damping 0.02", "damping 0.1", "dead band 0.01", "factor one half", "inverted inertia", "rate limit 7"]
-"""Further mistakes of the engine in C."""
-AMBIGUOUS = {"attitude by normalisation": "stale rates"}
-"""Mistakes whose errors are those of another one."""
-
-
-@pytest.mark.parametrize(
-    ("language", "mistake"), [*(each for language in LANGUAGES for each in planted(language)), *(("C", each) for each in ALSO)]
-)
-def test_planted_mistakes_are_named_by_the_summary(language, mistake, tmp_path):
-    """Measured: the mistake explains 70 % of the failing motions (stale rates) or more, most of them all."""
-    if missing(language):
-        pytest.skip(missing(language))
-    failing, explained, _ = summary(run(language, tmp_path, mistake, RK2, 2))
-    first = next(iter(explained))
-    assert AMBIGUOUS.get(first, first) == AMBIGUOUS.get(mistake, mistake)
-    assert explained[first] >= 0.65 * failing > 0
-
-
-@pytest.mark.parametrize("name", sampled(WRONG, 2, keep=("dead band", "damping 0.02")))
-def test_wrong_programs_are_named_by_the_summary_in_python(name, monkeypatch):
-    """Programs that share no code with the catalogue."""
-    program, test = WRONG[name], load_test()
-    monkeypatch.setattr(test, "simulate", program.simulate)
-    monkeypatch.setattr(test, "ORDER", program.order)
-    for path in sorted(MOTIONS.glob("*.json")):
-        with contextlib.suppress(pytest.fail.Exception):
-            test.test_motion(path)
-    failing, explained, rest = summary(test.summary())
-    if program.key == "explicit Euler":
-        assert rest[0] == "this program has order 1.0, 2 was declared"
-    else:
-        first = next(iter(explained))
-        assert re.sub(r" [\d.]+$", "", first) == program.key
-        assert explained[first] >= 0.65 * failing
-
-
-def load_test():
-    """Return a fresh copy of test_motions.py as a module."""
-    spec = importlib.util.spec_from_file_location("copied_test", MOTIONS / "test_motions.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-def all_methods(language):
-    """C runs a sample, and all methods with --all; the other languages two in double precision, and the rest with --attack."""
-    cases = list(product(METHODS, (False, True)))
-    for case in sampled(cases, 3, keep=[("RK4", False), ("Radau IIA", True), ("implicit Euler", False)]):
-        method, single = case.values
-        usual = not single and method in ("RK 3/8", "Gauss 4")
-        marks = case.marks if language == "C" else [slow if usual else pytest.mark.attack]
-        yield pytest.param(language, method, single, marks=marks, id=f"{language}-{method}-{'float' if single else 'double'}")
-
-
-@pytest.mark.parametrize(("language", "method", "single"), [each for language in LANGUAGES for each in all_methods(language)])
-def test_right_programs_pass(language, method, single, tmp_path):
-    """Explicit and implicit methods that are not among those of the tolerances, in double and single precision."""
-    if missing(language):
-        pytest.skip(missing(language))
-    order, numbers = METHODS[method]
-    for angle in programs.ANGLES if language == "C" else (0.01,):
-        assert run(language, tmp_path, "", numbers, order, angle, single) == ["0 of 48 motions failed"], angle
-
-
-@pytest.mark.skipif(bool(missing("C#")), reason=str(missing("C#")))
-def test_c_sharp_is_built_and_run(tmp_path):
-    """As it is: the body stands still, so that every motion fails."""
-    subprocess.run(["mcs", "-out:test.exe", MOTIONS / "Test.cs"], check=True, cwd=tmp_path)
-    done = subprocess.run(["mono", "test.exe", *sorted(MOTIONS.glob("*.csv"))], cwd=tmp_path, text=True, capture_output=True)
-    assert summary(done.stdout.splitlines()) == (48, {"frozen motion": 48}, [])
-
-
 def test_every_tolerance_is_above_round_off():
     for kept in FILES.values():
         for each in kept["tolerance"]:
@@ -394,21 +249,3 @@ def test_an_engine_that_does_nothing_fails():
     R0 = np.array([kept["R_WB0"] for kept in FILES.values()])
     ends = np.array([kept["R_WB"][-1] for kept in FILES.values()])
     assert angle_between(R0, ends).min() >= 10 * max(file["tolerance"][5]["attitude"] for file in FILES.values())
-
-
-@pytest.mark.skipif(bool(missing("C++")), reason="needs g++")
-def test_the_engine_on_the_page(tmp_path):
-    """Explicit Euler steps of a diagonal inertia: bodies in principal axes pass, the others fail with this mistake."""
-    (code,) = re.findall(r"```cpp\n(.*?)```", (MOTIONS / "README.md").read_text(), re.DOTALL)
-    text = re.sub(
-        r"^std::vector<State> simulate.*?^}\n", lambda _: code, (MOTIONS / "test.cpp").read_text(), flags=re.DOTALL | re.M
-    )
-    text = text.replace("ORDER = 2", "ORDER = 1").replace('HAS = "rotor,torque,damping,fixed point,orbit"', 'HAS = ""')
-    (tmp_path / "test.cpp").write_text(text)
-    subprocess.run(LANGUAGES["C++"][2], check=True, cwd=tmp_path)
-    files_of = sorted(str(path) for path in MOTIONS.glob("*.csv"))
-    lines = subprocess.run(["./a.out", *files_of], cwd=tmp_path, text=True, capture_output=True).stdout.splitlines()
-    told = [line for line in lines if " error " in line]
-    tilted = {name for name, kept in FILES.items() if not kept["features"] and np.count_nonzero(kept["inertia_B"]) > 3}
-    assert {line.partition(".csv")[0].rpartition("/")[2] for line in told} == tilted
-    assert summary(lines) == (len(tilted), {"no products of inertia": len(tilted)}, [])

@@ -1,4 +1,4 @@
-/* An engine for test.c and test.cpp: any Runge-Kutta method, and each mistake. METHOD: stages, A by rows, b. */
+/* An engine for rotation_test.c, as C and as C++: any Runge-Kutta method, and each mistake. METHOD: stages, A by rows, b. */
 #ifdef FLOAT
 typedef float real;
 #else
@@ -111,21 +111,19 @@ static void step(real t, real h, real *y) {
   if (IS("sleep") && speed < 0.5f) scale = 0;
   for (int i = 4; i < 7; i++) y[i] *= strstr(MISTAKE, "dead band") && fabs(y[i]) < atof(MISTAKE + 9) ? 0 : scale;
 }
-static void load(const char *key, real *out, int n, double factor) {
-  double found[9] = {0};
-  get(key, 0, found);
-  for (int i = 0; i < n; i++) out[i] = (real)(factor * found[i]);
+static void load(const double *from, real *out, int n, double factor) {
+  for (int i = 0; i < n; i++) out[i] = (real)(factor * from[i]);
 }
-static void simulate(double h, int steps, int samples, double state[][7]) {
+static void simulate(const Motion *m, double h, int steps, int samples, double state[][7]) {
   real y[7], t = 0, R[9], v[3], weight, com[3];
   if (getenv("MISTAKE")) MISTAKE = getenv("MISTAKE");
-  load("inertia_B", body.J, 9, 1), load("quaternion_wxyz0", y, 4, 1), load("w_WB_B0", y + 4, 3, 1);
-  load("rotor_momentum_B", body.rotor, 3, IS("without the rotor") ? 0 : IS("sign of the rotor") ? -1 : 1);
+  load(m->inertia_B, body.J, 9, 1), load(m->quaternion_wxyz0, y, 4, 1), load(m->w_WB_B0, y + 4, 3, 1);
+  load(m->rotor_momentum_B, body.rotor, 3, IS("without the rotor") ? 0 : IS("sign of the rotor") ? -1 : 1);
   double torque = IS("without the torque") ? 0 : IS("sign of the torque") ? -1 : 1;
-  load(IS("axes of the torque") ? "torque_W" : "torque_B", body.torque_B, 3, torque);
-  load(IS("axes of the torque") ? "torque_B" : "torque_W", body.torque_W, 3, torque);
-  load("damping", body.damping, 9, IS("without the damping") ? 0 : 1);
-  load("weight", &weight, 1, 1), load("com_B", com, 3, 1), load("orbit", &body.orbit, 1, 1);
+  load(IS("axes of the torque") ? m->torque_W : m->torque_B, body.torque_B, 3, torque);
+  load(IS("axes of the torque") ? m->torque_B : m->torque_W, body.torque_W, 3, torque);
+  load(m->damping, body.damping, 9, IS("without the damping") ? 0 : 1);
+  load(&m->weight, &weight, 1, 1), load(m->com_B, com, 3, 1), load(&m->orbit, &body.orbit, 1, 1);
   for (int i = 0; i < 3; i++) body.arm[i] = weight * com[i];
   for (int i = 0; i < 9; i++)
     if (i % 4) body.J[i] *= IS("no products of inertia") ? 0 : IS("sign of the products of inertia") ? -1 : 1;

@@ -86,19 +86,19 @@ fn step(body: &Body, t: Real, h: Real, start: &[Real; 7]) -> [Real; 7] {
     y
 }
 fn simulate(m: &Motion, h: f64, steps: usize, samples: usize) -> Vec<State> {
-    let get = |key: &str| -> V { let x = m.get(key); vec(|i| if i < x.len() { x[i] as Real } else { 0.0 }) };
-    let square = |key: &str| -> M { let x = m.get(key); mat(|i, k| x[3 * i + k] as Real) };
+    let get = |x: [f64; 3]| -> V { vec(|i| x[i] as Real) };
+    let square = |x: [f64; 9]| -> M { mat(|i, k| x[3 * i + k] as Real) };
     let products = sign("no products of inertia", "sign of the products of inertia");
-    let inertia = square("inertia_B");
+    let inertia = square(m.inertia_B);
     let mut j = mat(|i, k| if i == k { inertia[i][k] } else { products * inertia[i][k] });
     if is("smallest moments") && j[0][0] < 1e-6 { j = mat(|i, k| 1e-6 * ONE[i][k]); }
     let torque = sign("without the torque", "sign of the torque");
-    let (b, w) = if is("axes of the torque") { (get("torque_W"), get("torque_B")) } else { (get("torque_B"), get("torque_W")) };
-    let (q, w0, com, rotor) = (m.get("quaternion_wxyz0"), get("w_WB_B0"), get("com_B"), get("rotor_momentum_B"));
+    let (b, w) = if is("axes of the torque") { (get(m.torque_W), get(m.torque_B)) } else { (get(m.torque_B), get(m.torque_W)) };
+    let (q, w0, com, rotor) = (m.quaternion_wxyz0, get(m.w_WB_B0), get(m.com_B), get(m.rotor_momentum_B));
     let mut y: [Real; 7] = [q[0] as Real, q[1] as Real, q[2] as Real, q[3] as Real, w0[0], w0[1], w0[2]];
     let body = Body {
-        j, k: inverse(&j), r0: matrix(&y), orbit: m.get("orbit")[0] as Real, arm: vec(|i| m.get("weight")[0] as Real * com[i]),
-        damping: if is("without the damping") { mat(|_, _| 0.0) } else { square("damping") },
+        j, k: inverse(&j), r0: matrix(&y), orbit: m.orbit as Real, arm: vec(|i| m.weight as Real * com[i]),
+        damping: if is("without the damping") { mat(|_, _| 0.0) } else { square(m.damping) },
         rotor: vec(|i| sign("without the rotor", "sign of the rotor") * rotor[i]), torque_b: vec(|i| torque * b[i]), torque_w: vec(|i| torque * w[i]),
     };
     let (mut t, mut states) = (0.0, vec![]);

@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 
 import conservative as cv
@@ -15,40 +16,33 @@ from ....environments import PATIENCE
 
 MOTIONS = Path(cv.__file__).parents[1] / "references" / "motions"
 HERE = Path(__file__).parent
-MARK = re.compile(r"^(/\*|//|#) YOUR ENGINE.*?^(/\* END \*/|// END|# END)$", re.DOTALL | re.MULTILINE)
-SHIM = """
-static const Motion *current;
-static int get(const char *key, int, double *out) {
-  if (!current->rows.count(key)) return 0;
-  for (double x : current->rows.at(key)[0]) *out++ = x;
-  return 1;
-}
-#include <cstdlib>
-#include <cstring>
-ENGINE
-std::vector<State> simulate(const Motion &motion, double h, int steps, int samples) {
-  double found[20][7];
-  current = &motion;
-  simulate(h, steps, samples, found);
-  std::vector<State> states(samples);
-  for (int i = 0; i < samples; i++) for (int k = 0; k < 7; k++) states[i][k] = found[i][k];
-  return states;
-}
-"""
+MARK = re.compile(r"^ *(/\*|//|#) YOUR ENGINE.*?^ *(/\* END \*/|// END|# END)$", re.DOTALL | re.MULTILINE)
+ALL = "rotor, torque, damping, fixed point, orbit"
+STRICT = ("-Wall", "-Wextra", "-Werror", "-pedantic")
 COMPILERS = {"C": "gcc", "C++": "g++", "Rust": "rustc", "JavaScript": "node", "Python": sys.executable, "C#": "mcs"}
 """The program that each language needs."""
-PLUGINS = *("-p", "no:cacheprovider"), *("-p", "no:zarr"), *("-p", "no:hypothesispytest")
-PYTEST = ("-m", "pytest", "-q", "--tb=short", "-rN", "-n0", *PLUGINS, "test_motions.py")
-OWN = re.compile(r"^\w+: \w+ error |motions failed$|^\".+\" explains|not explained by|^this program has order")
-"""Lines of the test in Python, among the lines of pytest."""
 LANGUAGES = {
-    "C": ("test.c", "engine.h", ("gcc", "-std=c99", "-Wall", "-Wextra", "-Werror", "test.c", "-lm"), ("./a.out",)),
-    "C++": ("test.cpp", "engine.h", ("g++", "-std=c++17", "-Wall", "-Wextra", "-Werror", "test.cpp"), ("./a.out",)),
-    "Rust": ("test.rs", "engine.rs", ("rustc", "test.rs", "-A", "dead_code"), ("./test",)),
-    "JavaScript": ("test.mjs", "engine.mjs", (), ("node", "test.mjs")),
-    "Python": ("test_motions.py", "engine.py", (), (sys.executable, *PYTEST)),
+    "C": ("rotation_test.c", "engine.h", ("gcc", "-std=c99", *STRICT, "rotation_test.c", "-lm"), ("./a.out",)),
+    "C++": ("rotation_test.c", "engine.h", ("g++", "-std=c++11", *STRICT, "-x", "c++", "rotation_test.c"), ("./a.out",)),
+    "Rust": ("rotation_test.rs", "engine.rs", ("rustc", "rotation_test.rs"), ("./rotation_test",)),
+    "JavaScript": ("rotation.test.mjs", "engine.mjs", (), ("node", "rotation.test.mjs")),
+    "Python": ("test_rotation.py", "engine.py", (), (sys.executable, "test_rotation.py")),
+    "C#": ("RotationTest.cs", "engine.cs", ("mcs", "-warnaserror", "RotationTest.cs"), ("mono", "RotationTest.exe")),
 }
 """The test of each language, the engine, and the commands that build and run it."""
+
+
+@dataclass(frozen=True)
+class Engine:
+    """A Runge-Kutta method, and what is declared in the test: its order, |w| h, single precision, and features."""
+
+    method: tuple[float, ...]
+    order: int
+    angle: float = 0.01
+    single: bool = False
+    rounds: bool = False
+    """Single precision that is not declared."""
+    has: str = ALL
 
 
 def missing(language):
@@ -56,53 +50,61 @@ def missing(language):
     return None if shutil.which(COMPILERS[language]) else f"{COMPILERS[language]} is not installed"
 
 
-def write(language, folder, method, order, angle, single):
+def write(language, folder, engine):
     """Write the test with an engine and its settings into a folder."""
-    name, engine, _, _ = LANGUAGES[language]
-    own, numbers = (HERE / engine).read_text(), ", ".join(repr(float(x)) for x in method)
-    text = MARK.sub(lambda _: SHIM.replace("ENGINE", own) if language == "C++" else own, (MOTIONS / name).read_text(), count=1)
-    yes = {"C": str(int(single)), "Rust": str(float(single)), "Python": str(single)}.get(language, str(single).lower())
+    name, own, _, _ = LANGUAGES[language]
+    code, numbers, rounds = (
+        (HERE / own).read_text(),
+        ", ".join(repr(float(x)) for x in engine.method),
+        engine.single or engine.rounds,
+    )
+    text = MARK.sub(lambda _: code, (MOTIONS / name).read_text(), count=1)
+    yes = {"C": "1", "C++": "1", "Python": "True"}.get(language, "true")
     for pattern, new in (
-        (r"\bORDER(: f64)?( =)? 2\b", rf"ORDER\1\2 {order}"),
-        (r"\bANGLE(: f64)?( =)? 0.01", rf"ANGLE\1\2 {angle}"),
-        (r"\bSINGLE(: f64)?( =)? (0.0|0|[fF]alse)", rf"SINGLE\1\2 {yes}"),
-        (r"FLOAT = [fF]alse", f"FLOAT = {yes}"),
-        (r"type Real = f64", f"type Real = f{32 if single else 64}"),
-        (r"METHOD(: ..Real.)? = &?\[\]", lambda m: f"METHOD{m[1] or ''} = {'&' if m[1] else ''}[{numbers}]"),
-        (r"Path\(__file__\).parent", f"Path({str(MOTIONS)!r})"),
+        (r"\bORDER(: u32)? = 2\b", rf"ORDER\1 = {engine.order}"),
+        (r"\bANGLE(: f64)? = 0.01", rf"ANGLE\1 = {engine.angle}"),
+        (r'\bHAS(: &str|\[\])? = ""', rf'HAS\1 = "{engine.has}"'),
+        *[(r"\bSINGLE(: bool)? = ([fF]alse|0)\b", rf"SINGLE\1 = {yes}")] * engine.single,
+        *[(r"\bFLOAT = [fF]alse", f"FLOAT = {yes}"), (r"type Real = f64", "type Real = f32")] * rounds,
+        (r"METHOD(: ..Real.)? = (&?\[\]|{})", lambda m: f"METHOD{m[1] or ''} = {m[2][:-1]}{numbers}{m[2][-1]}"),
     ):
         text = re.sub(pattern, new, text)
-    settings = [f"#define METHOD {numbers}", *["#define FLOAT"] * single] if engine.endswith("h") else []
+    settings = [f"#define METHOD {numbers}", *["#define FLOAT"] * rounds] if own.endswith("h") else []
     (folder / name).write_text("\n".join([*settings, text]))
 
 
 @functools.cache
-def build_once(language, parent, *settings):
+def build_once(language, parent, engine):
     """Return a new folder in `parent`, which all tests of a process have in common, with the program of a language."""
     folder = Path(tempfile.mkdtemp(dir=parent))
-    write(language, folder, *settings)
+    write(language, folder, engine)
     if build := LANGUAGES[language][2]:
         subprocess.run(build, check=True, cwd=folder)
     return folder
 
 
-def run(language, folder, mistake, method, order, angle=0.01, single=False, share=1.0):
-    """Return the lines that the test of a language prints with an engine, in a folder of a test.
+def start(language, folder, engine, mistake="", *arguments, **environment):
+    """Return the finished program of a language, in a folder of a test, without a file of known errors if none is asked for."""
+    made, (program, *rest) = build_once(language, folder.parent, engine), LANGUAGES[language][3]
+    parts = [made / program if program.startswith("./") else program, *(made / name for name in rest)]
+    own = {name: text for name, text in os.environ.items() if not name.startswith("ROTATION_")}
+    return subprocess.run(
+        [*map(str, parts), *map(str, arguments)],
+        text=True, capture_output=True, timeout=PATIENCE, cwd=folder, env=own | {"MISTAKE": mistake} | environment,
+    )  # fmt: skip
 
-    `share` is a factor of all tolerances, for tests that read CSV files.
+
+def run(language, folder, engine, mistake="", share=1.0, embedded=False):
+    """Return the lines that the test of a language prints with an engine: with all files, or with the embedded motions.
+
+    `share` is a factor of all tolerances of the files.
     """
-    made = build_once(language, folder.parent, tuple(method), order, angle, single)
-    files = sorted(MOTIONS.glob("*.csv"))
+    files = [] if embedded else sorted(MOTIONS.glob("*.csv"))
     if share != 1:
         files = [scaled(path, folder, share) for path in files]
-    own = {"JavaScript": [MOTIONS], "Python": []}.get(language, files)
-    command, env = [*LANGUAGES[language][3], *map(str, own)], os.environ | {"MISTAKE": mistake}
-    done = subprocess.run(command, text=True, capture_output=True, timeout=PATIENCE, cwd=made, env=env)
-    assert done.returncode in (0, 1), done.stderr
-    if language != "Python":
-        return done.stdout.splitlines()
-    lines = [line for line in done.stdout.splitlines() if OWN.search(line)]
-    return lines if any(line.endswith("motions failed") for line in lines) else [*lines, f"0 of {len(files)} motions failed"]
+    done = start(language, folder, engine, mistake, *files)
+    assert done.returncode in (0, 1), done.stdout + done.stderr
+    return done.stdout.splitlines()
 
 
 def scaled(path, folder, share):

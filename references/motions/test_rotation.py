@@ -1,0 +1,538 @@
+"""Exact rotations as a test of your engine: fill in `simulate`, then run pytest, or python test_rotation.py (CC0).
+
+With --record known.txt, today's errors become known errors: a later run fails only if a motion gets worse.
+"""
+
+import math
+import os
+import sys
+from pathlib import Path
+
+ORDER = 2  # the order of your integrator: 1, 2 or 4 (2 for order 3)
+ANGLE = 0.01  # |w| h in rad; 0.03 and 0.1 with the files of all motions
+SINGLE = False  # single precision
+HAS = ""  # features of your engine: "rotor, torque, damping, fixed point, orbit"; other motions are skipped
+
+
+# YOUR ENGINE
+def simulate(m, h, steps, samples):
+    """Return (quaternion, rates) of the body of the motion `m` after each `steps` steps of h seconds.
+
+    The quaternion has the scalar first and maps body to world. The rates are in body axes, rad/s.
+    """
+    states = []  # m["inertia_B"] is the inertia, 3 rows
+    for _ in range(samples):
+        for _ in range(steps):
+            pass  # one step
+        states.append((m["quaternion_wxyz0"], m["w_WB_B0"]))
+    return states
+
+
+# END
+
+NAMES = "attitude", "rates", "energy", "momentum"
+NEAR = 0.2  # mean square of logarithms: errors over the errors of a mistake that explains them
+LARGEST = 1e6  # instead of errors that are not finite
+HEADER = "# Known errors on exact motions. A later run fails if a motion is worse or has another mistake. Written by --record."
+
+
+class Refused(Exception):
+    """The test is not possible."""
+
+
+def read(lines):
+    """Return the motions of lines with a key and its values."""
+    motions = []
+    for line in lines:
+        key, *values = line.strip().split(",")
+        if key == "name":
+            motions.append({"name": values[0], "features": [], "samples": [], "tolerance": [], "catches": {}})
+        elif key == "mistake":  # a field for each motion
+            for m, field in zip(motions, values[1:]):
+                if field:
+                    m["catches"][values[0]] = [float(x) for x in field.split()]
+        elif key == "catches":
+            motions[-1][key][values[0]] = [float(x) for x in values[1:]]
+        elif key == "features":
+            motions[-1][key] = [x for x in values if x]
+        elif motions and key != "about":
+            row = [float(x) for x in values]
+            if key == "sample":  # files have a matrix before the quaternion, and more after the rates
+                q = 10 if len(row) > 8 else 1
+                motions[-1]["samples"].append((row[0], row[q : q + 4], row[q + 4 : q + 7]))
+            elif key == "tolerance":
+                motions[-1][key].append(row)
+            elif key in ("inertia_B", "damping"):
+                motions[-1][key] = [row[:3], row[3:6], row[6:]]
+            else:
+                motions[-1][key] = row[0] if len(row) == 1 else row
+    return motions
+
+
+def dot(a, b):
+    return sum(x * y for x, y in zip(a, b))
+
+
+def cross(a, b):
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+
+def rotate(q, v):
+    uv = cross(q[1:], v)
+    return [x + 2 * (q[0] * y + z) for x, y, z in zip(v, uv, cross(q[1:], uv))]
+
+
+def invariants(m, q, w):
+    """Return the energy and the momentum in world axes."""
+    L = [dot(row, w) for row in m["inertia_B"]]
+    energy = dot(L, w) / 2 + m.get("weight", 0) * rotate(q, m.get("com_B", [0, 0, 0]))[2]
+    return energy, rotate(q, [x + y for x, y in zip(L, m.get("rotor_momentum_B", [0, 0, 0]))])
+
+
+def worst(m, steps):
+    """Return the largest errors of attitude (rad), rates, energy and momentum, with so many steps before each sample."""
+    states = simulate(m, m["samples"][0][0] / steps, steps, len(m["samples"]))
+    if len(states) != len(m["samples"]):
+        raise Refused(f"{m['name']}: simulate returned {len(states)} states, expected {len(m['samples'])}")
+    found = [0, 0, 0, 0]
+    for (q, w), (_, q0, w0) in zip(states, m["samples"]):
+        q, w = [float(x) for x in q], [float(x) for x in w]
+        (energy, momentum), (energy0, momentum0) = invariants(m, q, w), invariants(m, q0, w0)
+        apart = min(math.dist(q, q0), math.dist(q, [-x for x in q0]))
+        rest = math.dist(w, w0), abs(energy - energy0), math.dist(momentum, momentum0)
+        now = [4 * math.asin(min(apart / 2, 1)), *(x / y for x, y in zip(rest, m["scale"]))]
+        found = [max(x, y) if y < LARGEST else LARGEST for x, y in zip(found, now)]
+    return found
+
+
+def check(m):
+    """Run a motion, and return its errors, the mistakes that explain them, and the order if the body is free."""
+    rows = [row for row in m["tolerance"] if row[:2] == [ORDER, ANGLE]]
+    if not rows:
+        raise Refused(f"{m['name']} has no tolerance for order {ORDER:g} and |w| h = {ANGLE:g} rad")
+    steps, limit = int(rows[0][2]), [x + SINGLE * m["single"] for x in rows[0][3:]]
+    found, free = worst(m, steps), not m["features"]
+    most = max(range(4), key=lambda k: found[k] / limit[k])
+    ratio, order, falls, near, note = found[most] / limit[most], None, 0, {}, ""
+    if free or ratio > 1:
+        half = worst(m, 2 * steps)
+        if free and found[0] < LARGEST and half[0] > (m["single"] if SINGLE else 1e-11):  # above rounding
+            order = math.log2(found[0] / half[0]) if found[0] > half[0] else 0.0
+        if found[most] < LARGEST and half[most] > 0:
+            falls = math.log2(found[most] / half[most])
+    if ratio > 1:
+        for name, known in m["catches"].items():
+            apart = sum(math.log(max(x, y) / max(z, y)) ** 2 for x, y, z in zip(found, limit, known)) / len(known)
+            if apart < NEAR:
+                near[name] = apart
+        if falls >= ORDER - 0.5 and (ratio <= 2 or not near):
+            note = f": {100 * (ratio - 1):.0f} % above the tolerance, falls as h^{falls:.1f}: right"
+    return {"name": m["name"], "free": free, "found": found, "limit": limit, "most": most, "near": near, "order": order,
+            "note": note, "failed": ratio > 1 and not note, "mistake": ""}  # fmt: skip
+
+
+def name_mistakes(failing):
+    """Name the mistake of each motion that fails; return those that explain most motions, and the motions that they leave."""
+    rest, named = failing, []
+    for each in failing:
+        each["mistake"] = min(each["near"], key=each["near"].get, default="")
+    for _ in range(3):
+        votes = {}
+        for each in rest:
+            for name, apart in each["near"].items():
+                votes.setdefault(name, []).append(apart)
+        best = max(votes, key=lambda name: (len(votes[name]), -sum(votes[name])), default=None)
+        if not best or 10 * len(votes[best]) < len(failing):
+            break
+        named.append(f'"{best}" explains {len(votes[best])} of them')
+        for each in rest:
+            if best in each["near"]:
+                each["mistake"] = best
+        rest = [each for each in rest if best not in each["near"]]
+    return named, rest
+
+
+def short(x, digits):
+    """Return a number with so many digits."""
+    return f"{x:.{digits - 1 - math.floor(math.log10(x))}f}" if 0.01 <= x < 10 else f"{x:.{digits - 1}e}"
+
+
+def error(each, k):
+    return f"{each['name']}: {NAMES[k]} error {each['found'][k]:.1e}{' rad' * (k == 0)}"
+
+
+def settings():
+    return ORDER, ANGLE, "single" if SINGLE else "double"
+
+
+def read_known(path):
+    """Return the order and, by motion, the attitude error, the rates error and the mistake, of a file of known errors."""
+    try:
+        lines = Path(path).read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as e:
+        raise Refused(f"{path}: cannot be read. Write it with --record {path}") from e
+    order, found, then = None, {}, None
+    for n, line in enumerate(lines):
+        key, *values = line.strip().split(",")
+        try:
+            if key == "settings":
+                then = int(values[0]), float(values[1]), values[2]
+            elif key == "order":
+                order = float(values[0])
+            elif key == "motions":
+                name, attitude, rates, mistake = values
+                found[name] = float(attitude), float(rates), mistake
+            elif key and key[0] != "#":
+                raise ValueError
+        except (ValueError, IndexError) as e:
+            raise Refused(f"{path}: line {n + 1} is not of this test: {line.strip()}. Record again: --record {path}") from e
+    if then is None:
+        raise Refused(f"{path}: not a file of known errors. Write another one with --record")
+    if then != settings():
+        was, now = (f"order {order}, {angle:g} rad, {precision}" for order, angle, precision in (then, settings()))
+        raise Refused(f"{path}: recorded with {was}; now {now}: record again")
+    return order, found
+
+
+def write_known(path, results, order):
+    try:
+        old = Path(path).read_text(encoding="utf-8") if Path(path).exists() else HEADER
+    except (OSError, UnicodeDecodeError):
+        old = ""
+    if not old.startswith(HEADER[:31]):
+        raise Refused(f"{path}: not a file of known errors, and not replaced. Choose another name")
+    lines = [HEADER, "settings,{:d},{:g},{}".format(*settings()), *([f"order,{order:.2f}"] if order is not None else [])]
+    lines += [f"motions,{r['name']},{short(r['found'][0], 3)},{short(r['found'][1], 3)},{r['mistake']}" for r in results]
+    try:
+        Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+    except OSError as e:
+        raise Refused(f"{path}: cannot be written") from e
+
+
+def compare(results, order, path, skipped):
+    """Return the lines of a run with known errors, and the number of motions that are worse."""
+    before, known = read_known(path)
+    lines, mistakes, first, new = [], {}, "", 0
+    for r in results:
+        was = known.get(r["name"])
+        now, mistake = r["found"], r["mistake"] or "no known mistake"
+        allowed = [1.005 * x + y for x, y in zip(was[:2], r["limit"])] if was else [0, 0]  # recorded numbers have three digits
+        same = was and (was[2] in r["near"] if was[2] else not r["near"])
+        if r["failed"] and not (same and now[0] <= allowed[0] and now[1] <= allowed[1]):
+            if not was:
+                lines.append(f"{error(r, r['most'])}, tolerance {r['limit'][r['most']]:.1e}, not recorded; {mistake}")
+            else:
+                k = int(now[1] - allowed[1] > 0 >= now[0] - allowed[0])
+                other = "" if same else f", was {was[2] or 'no known mistake'}"
+                lines.append(f"{error(r, k)}, was {was[k]:.1e}; {mistake}{other}")
+            first, new = first or f"{r['name']} ({mistake})", new + 1
+            continue
+        if r["failed"]:
+            mistakes[was[2]] = mistakes.get(was[2], 0) + 1
+        for k in (0, 1):
+            if was and was[k] - now[k] > r["limit"][k] + 0.005 * was[k]:
+                unit = " rad" if k == 0 else " (rates)"
+                lines.append(f"better: {r['name']}, {was[k]:.1e} to {now[k]:.1e}{unit}: record again to tighten")
+                break
+    for name in known:
+        if name not in {r["name"] for r in results}:
+            lines.append(f"{name}: was tested, is {'skipped' if name in skipped else 'not there'} now: record again")
+            new += 1
+    each = ", ".join(f"{name or 'no known mistake'}: {n}" for name, n in sorted(mistakes.items(), key=lambda item: -item[1]))
+    lines.append(f"known errors: {sum(mistakes.values())}{f' ({each})' * bool(each)}, new failures: {new}")
+    parts = []
+    free = [r for r in results if r["free"] and r["name"] in known]
+    a, b = (short(max(x, default=0), 2) for x in ([known[r["name"]][0] for r in free], [r["found"][0] for r in free]))
+    if a != b:
+        parts.append(f"attitude error {a} to {b} rad")
+    if None not in (before, order) and abs(before - order) >= 0.2:
+        parts.append(f"order {before:.1f} to {order:.1f}")
+    text = ", ".join(parts)
+    if first:
+        text += f"{'; ' if text else ''}first bad motion: {first}"
+    return lines + [f"free rotation at your step: {text}"] * bool(text), new
+
+
+def run(arguments, say=print):
+    """Test the motions and return the exit code: 0, 1 if a motion fails, 2 if the test is not possible."""
+    folder, paths = Path(__file__).resolve().parent, []
+    asked = {name: os.environ.get(f"ROTATION_{name.upper()}") for name in ("record", "known")}
+    try:
+        values = iter(arguments)
+        for each in values:
+            if each in ("--record", "--known"):
+                asked[each[2:]] = next(values, None)
+                if not asked[each[2:]]:
+                    raise Refused(f"{each}: expected the name of a file")
+            elif each[:1] == "-" or not Path(each).exists():
+                raise Refused(f"{each}: expected --record FILE, --known FILE, a folder of motions or CSV files")
+            else:
+                paths += sorted(Path(each).glob("*.csv")) if Path(each).is_dir() else [Path(each)]
+        if asked["record"] and asked["known"]:
+            raise Refused("record and known are both given: give one of them")
+        known = asked["known"] or (not asked["record"] and (folder / "known.txt").exists() and folder / "known.txt")
+        motions = [m for path in paths for m in read(path.read_text(encoding="utf-8").splitlines())]
+        if len(motions) < len(paths) or (len(arguments) and not motions and paths):
+            raise Refused("a file without a motion")
+        motions = motions or read(MOTIONS.splitlines())
+        results, skipped = [], []
+        for m in motions:
+            if missing := [part for part in m["features"] if part not in HAS.split(", ")]:
+                say(f"{m['name']}: skipped, it has {missing[0]}")
+                skipped.append(m["name"])
+            else:
+                results.append(check(m))
+        orders = sorted(r["order"] for r in results if r["order"] is not None)
+        order = orders[len(orders) // 2] if orders else None
+        failing = [r for r in results if r["failed"]]
+        named, rest = name_mistakes(failing)
+        for r in results:
+            if r["note"] or (r["failed"] and not known):
+                text = r["note"] or f"; {r['mistake'] or 'no known mistake'}"
+                say(f"{error(r, r['most'])}, tolerance {r['limit'][r['most']]:.1e}{text}")
+        lines, new = compare(results, order, known, skipped) if known else ([], len(failing))
+        if not known:
+            say(f"{len(failing)} of {len(results)} motions failed")
+            lines += named
+            if 2 * len(rest) > len(failing) and order is not None and 0.5 <= order < ORDER - 0.5:
+                lines.append(f"this program has order {order:.1f}, {ORDER} was declared")
+            if rest:
+                lines.append(f"{len(rest)} not explained by a mistake: {', '.join(r['name'] for r in rest[:5])}")
+        for line in lines:
+            say(line)
+        if asked["record"]:
+            write_known(asked["record"], results, order)
+            say(f"{asked['record']}: {len(results)} motions recorded, {len(failing)} known errors")
+            return 0
+        if new and not known:
+            say("Known and accepted? --record known.txt (or ROTATION_RECORD=known.txt): then only new failures fail")
+        return int(new > 0)
+    except Refused as e:
+        say(e)
+        return 2
+
+
+# BEGIN MOTIONS
+MOTIONS = """
+name,brick_flip
+inertia_B,13,0,0,0,5,0,0,0,10
+quaternion_wxyz0,1,0,0,0
+w_WB_B0,0,.05,10
+sample,.04,.980066080285,-7.7260487e-5,.00099432641,.198669282028,-.00773973082,.05092592027,9.99999377004
+sample,.08,.921059033938,-.000313002448,.001953836648,.389417950989,-.01576610603,.0537379694,9.99997414868
+sample,.12,.825331324351,-.00071844221,.002839874903,.564641146212,-.02437638132,.05854028038,9.99993820218
+sample,.16,.696699404582,-.001310044891,.003606267964,.717352924487,-.03388942615,.06551068157,9.99988055599
+sample,.2,.540291612426,-.002106144642,.004195995668,.841464753461,-.0446575226,.07490727032,9.99979259124
+scale,10.0002,500.006,100
+tolerance,1,.01,40,.00022,.00028,1.9e-6,.00015
+tolerance,2,.01,40,.00017,5.6e-6,1.1e-6,2e-6
+tolerance,4,.01,40,2.8e-9,1.7e-10,1.1e-10,1.4e-10
+single,.00035
+name,golden_4
+features,fixed point
+inertia_B,37.569567086791935,0,0,0,24.42047900665016,0,0,0,49.74541379718716
+quaternion_wxyz0,.080676695026,.243425168124,.406750890403,.87680623376
+w_WB_B0,-.493501866735,1.039660622419,.000416869186
+weight,3010
+com_B,.02361198596771947,-.01514681660749079,.003072647492940911
+sample,.092,.067689278842,.195298596414,.39279062573,.896098289312,-.406698404626,1.185777743939,-.137063569628
+sample,.184,.056257799272,.13796008191,.383108854263,.911608293954,-.302613112942,1.352292838003,-.26434224599
+sample,.276,.045877224471,.070871031907,.377762999676,.922045385644,-.180760141687,1.534728636918,-.378906739634
+sample,.368,.036109081052,-.006128208929,.376666328191,.925624684485,-.041787400584,1.726675384467,-.477850895476
+scale,1.79206,42.116,48.4305
+tolerance,1,.01,20,.022,.017,.051,.026
+tolerance,2,.01,20,7.2e-5,5.8e-5,.00014,9.3e-5
+tolerance,4,.01,20,8e-10,6.3e-10,5.7e-10,1.1e-9
+single,.00013
+name,golden_9
+inertia_B,3.330073724153789,0,0,0,1.354784666276132,0,0,0,4.479344421805398
+quaternion_wxyz0,-.470821233501,-.862831436986,-.037843352356,-.180047655126
+w_WB_B0,-34.32588597222,21.20929544084,-40.60791817033
+sample,.0034,-.527739029423,-.822765111727,-.106497802656,-.182228718314,-31.28011371377,25.10961113494,-41.7482365852
+sample,.0068,-.574569851351,-.776359009178,-.180150498896,-.186230965562,-27.63998986798,28.71238447059,-42.9385064686
+sample,.0102,-.609868156415,-.724654963895,-.258141186148,-.19052334006,-23.42419341637,31.92228858191,-44.10092148237
+sample,.0136,-.632536701804,-.668800542901,-.339402991611,-.19341345344,-18.6776624159,34.63677355977,-45.15319950195
+scale,59.8947,5959.8,216.745
+tolerance,1,.01,20,.0066,.0087,.0043,.0065
+tolerance,2,.01,20,8.6e-5,.00015,4.7e-5,6.4e-5
+tolerance,4,.01,20,2.9e-9,3.8e-9,6.4e-10,2.3e-9
+single,.00017
+name,separatrix_turned
+inertia_B,.8316,-.005554,-.1469,-.005554,.8775,-.0191,-.1469,-.0191,.5895
+quaternion_wxyz0,.393215738015,.327179507203,.169092772836,-.842462217324
+w_WB_B0,1.062,.1578,-.1296
+sample,.092,.370537960828,.350827234519,.132385642469,-.849762268386,1.063966219695,.143831719492,-.12971383988
+scale,1.08145,.504512,.941297
+tolerance,1,.01,10,.00065,.0011,.00017,.00064
+tolerance,2,.01,10,6.6e-5,.00011,1.8e-5,6.5e-5
+tolerance,4,.01,10,2.7e-10,2.6e-10,1.1e-10,1.6e-10
+single,3.6e-5
+name,tiny
+inertia_B,9.455e-10,0,0,0,9.151e-10,0,0,0,1.048e-9
+quaternion_wxyz0,.112992486249,.491967285263,-.845943746611,.171988563141
+w_WB_B0,.5509,-.6398,-.5359
+sample,.1,.076857449693,.522644337516,-.830603856008,.176162036983,.546063583369,-.643095463524,-.536920557978
+scale,1.00002,4.81258e-10,9.64116e-10
+tolerance,1,.01,10,.00057,.00061,6.4e-5,.00055
+tolerance,2,.01,10,5.7e-5,6.2e-5,7.3e-6,5.6e-5
+tolerance,4,.01,10,2.4e-10,1.4e-10,1.1e-10,1.1e-10
+single,3.4e-5
+name,tiny_fast
+inertia_B,4.48e-8,5.651e-11,2.137e-9,5.651e-11,4.274e-8,-8.16e-10,2.137e-9,-8.16e-10,5.324e-8
+quaternion_wxyz0,-.024905367561,-.782168571581,-.416089674908,-.463099806448
+w_WB_B0,215.5,128.8,-164.2
+sample,.00033,-.00078849058,-.761066699215,-.453804148479,-.463506906585,216.6216023664,126.641690707,-164.3938800226
+scale,299.986,.0020557,1.37463e-5
+tolerance,1,.01,10,.00011,2e-4,1.8e-5,.00012
+tolerance,2,.01,10,1.5e-5,2.1e-5,2.7e-6,1.3e-5
+tolerance,4,.01,10,2.4e-10,1.4e-10,1.1e-10,1.2e-10
+single,3.4e-5
+name,walking_pace
+inertia_B,.8099,-.00586,-.01041,-.00586,.8089,.00958,-.01041,.00958,.8239
+quaternion_wxyz0,-.775127906658,-.185030532557,.286047201683,-.532087801732
+w_WB_B0,.02244,.04795,.08484
+sample,1,-.756401363967,-.168592678297,.268959227751,-.571921689762,.0224224698228,.0481121522205,.0847527934615
+scale,.100003,.00411182,.0822474
+tolerance,1,.01,10,.00051,5e-4,1.2e-5,.00051
+tolerance,2,.01,10,5.2e-5,5.1e-5,2.1e-6,5.2e-5
+tolerance,4,.01,10,2.4e-10,1.5e-10,1.1e-10,1.1e-10
+single,3.3e-5
+name,fast
+inertia_B,.8812,-.0299,.109,-.0299,.9868,.1588,.109,.1588,1.207
+quaternion_wxyz0,-.748155258326,.58612163286,.282058533219,-.131027190963
+w_WB_B0,-326,908.1,-262.8
+sample,1e-4,-.752123997076,.599878943248,.257661233843,-.089807767175,-330.0531090618,906.0350244243,-264.6289699644
+scale,999.993,475678,952.836
+tolerance,1,.01,10,.00017,.00021,1.3e-5,.00017
+tolerance,2,.01,10,2e-5,2.2e-5,2.1e-6,1.8e-5
+tolerance,4,.01,10,2.4e-10,1.3e-10,1.1e-10,1.3e-10
+single,3.4e-5
+name,half_turn_slow
+inertia_B,.8868,.09572,.03171,.09572,1.127,.2494,.03171,.2494,1.132
+quaternion_wxyz0,.054096488981,.264982801849,.646958010553,-.71295372724
+w_WB_B0,.005301,.01296,-.01428
+sample,5,.004123912615,.265435626072,.64790674323,-.713963426117,.00529663916983,.01300048427984,-.01424508416235
+sample,10,-.045859203428,.265354494612,.647223701313,-.713151741293,.00528941417733,.0130418683854,-.01421027297955
+sample,15,-.095727662301,.264741949711,.644910498133,-.710519784476,.00527932133719,.01308415605275,-.01417555321288
+sample,20,-.145356520806,.263602261347,.640972580665,-.706073282675,.00526635597919,.01312735022887,-.01414091067625
+scale,.0200007,.000180543,.0180695
+tolerance,1,.01,10,.0022,.0021,8.6e-5,.0022
+tolerance,2,.01,10,6e-5,5.5e-5,3.6e-6,5.6e-5
+tolerance,4,.01,10,6.4e-10,1.8e-10,1.1e-10,1.6e-10
+single,7.5e-5
+name,torque_and_rotor
+features,rotor,torque
+inertia_B,.7859,-.2539,-.175,-.2539,.8081,.01264,-.175,.01264,1.181
+quaternion_wxyz0,-.707928824874,.085291424805,-.209978888734,-.668932745538
+w_WB_B0,-.3308,.6182,-.7131
+rotor_momentum_B,-.102,.0889,.47
+torque_B,.415,-.334,.578
+sample,.1,-.722566984008,.123621717508,-.216671594833,-.644723230987,-.321777720106,.557187444228,-.663801945577
+scale,1.00006,.502762,.830319
+tolerance,1,.01,10,.0013,.00094,.00065,.0011
+tolerance,2,.01,10,8.2e-5,5.5e-5,2e-5,8.2e-5
+tolerance,4,.01,10,3.1e-10,2.4e-10,1.9e-10,3.1e-10
+single,3.5e-5
+name,damped
+features,damping
+inertia_B,.3919,0,0,0,.6702,0,0,0,.3418
+quaternion_wxyz0,-.703884220568,-.509916125695,-.336944577175,.36194046569
+w_WB_B0,.7249,-.6706,.1575
+damping,.087,0,0,0,.0821,0,0,0,.0739
+sample,.2,-.694208072664,-.53896732184,-.253645539906,.404046182908,.6725306120189,-.6563486944512,.2247339429246
+sample,.4,-.683130717889,-.56136133328,-.167784848617,.435951970232,.6162510995068,-.6428799957858,.281943256633
+sample,.6,-.671374170726,-.576391227855,-.080927296902,.458781699669,.5575043008933,-.6299750719911,.3295339541524
+sample,.8,-.659420129594,-.583672711928,.005496016773,.473773207174,.4975540271041,-.6174486138359,.3680137969515
+scale,.999995,.257903,.534413
+tolerance,1,.01,20,.0058,.0072,.0021,.0037
+tolerance,2,.01,20,.00011,.00011,2.8e-5,6.7e-5
+tolerance,4,.01,20,1.7e-9,1.5e-9,2.5e-10,1.3e-9
+single,.00014
+name,orbit_flat
+features,orbit
+inertia_B,104.1,1.335,20.02,1.335,76.02,42.43,20.02,42.43,97.28
+quaternion_wxyz0,-.720623572499,-.295845461109,-.611680480402,-.137927951463
+w_WB_B0,-.001075,.0008884,.0005521
+orbit,.00105
+sample,148,-.694082227649,-.248358277242,-.631339741757,-.240786540042,-.001273515980661,.000938316138226,.000609189917618
+sample,296,-.656902752666,-.188432003709,-.638726835542,-.353553649501,-.001489004095649,.000988056039612,.000679054139937
+sample,444,-.605308317068,-.116451664536,-.628716422745,-.474084919488,-.00171701448256,.001033393421464,.000767229301881
+sample,592,-.535115395503,-.034671454685,-.595876556406,-.597813125694,-.001938955150609,.001065491586751,.000877124747801
+scale,.00237995,.000279105,.23499
+tolerance,1,.01,40,.0054,.0057,.0013,.0035
+tolerance,2,.01,40,8.1e-5,8.3e-5,9.5e-5,6.9e-5
+tolerance,4,.01,40,7.8e-10,7.9e-10,9.3e-10,6.4e-10
+single,.00031
+mistake,inertia about the centre of mass,,.0014 .0046,,,,,,,,,,
+mistake,sign of the torque,,,,,,,,,,.0086 .17,,
+mistake,axes of the torque,,,,,,,,,,.0078 .16,,
+mistake,without the torque,,,,,,,,,,.0043 .086,,
+mistake,sign of the rotor,,,,,,,,,,.0078 .15,,
+mistake,without the rotor,,,,,,,,,,.0039 .077,,
+mistake,size of the rotor 0.98,,,,,,,,,,7.8e-5 .0015,,
+mistake,sign of the damping,,,,,,,,,,,.12 .3,
+mistake,without the damping,,,,,,,,,,,.055 .14,
+mistake,turning of the field,,,,,,,,,,,,.024 .093
+mistake,dead band 0.001,.0042 .0051,,,,,,,,,,,.7 .59
+mistake,sign of the field,,.33 1,,,,,,,,,,.51 .74
+mistake,without the field,,.16 .51,,,,,,,,,,.26 .39
+mistake,smallest moments,,,,,3e-4 .0059,4e-4 .0081,,,,,,
+mistake,rate limit 100,,,,,,.059 .67,,.081 .9,,,,
+mistake,rate limit 47,,,.16 .22,,,.075 .84,,.086 .95,,,,
+mistake,rate limit 7,.6 .3,,.69 .89,,,.087 .98,,.089 .99,,,,
+mistake,dead band 0.01,.0042 .0051,.093 .27,,,,,,,.1 .26,,,1.1 1
+mistake,attitude by normalisation,3e-5 0,.0022 0,.0017 0,,,4e-5 0,,,,4e-4 0,.0015 0,.0017 0
+mistake,stale rates,2.4e-5 0,.0022 0,.0017 0,,,4e-5 0,,,,.00039 0,.0015 0,.0017 0
+mistake,sign of the products of inertia,,,,.0016 .033,,.00026 .0053,.00017 .0033,.0013 .027,.017 .083,.0024 .047,,.54 .77
+mistake,no products of inertia,,,,.00081 .016,,.00012 .0025,8.3e-5 .0017,6e-4 .012,.0066 .033,.001 .02,,.28 .41
+mistake,diagonal gyroscopic term,,,,.00081 .016,,.00011 .0023,8.3e-5 .0017,.00058 .012,.0059 .03,.00091 .018,,.23 .4
+mistake,damping 0.02,.004 .004,.0018 .0059,.00011 .00028,9.1e-5 .0018,1e-4 .002,3.3e-7 6.6e-6,.00099 .02,,.07 .33,9.7e-5 .0019,.0058 .014,1 1
+mistake,inertia of the start,.003 .005,.0088 .043,.037 .14,2.2e-5 .00065,9.9e-6 3e-4,1.3e-5 4e-4,,8.2e-6 .00024,.00029 .0022,2.4e-5 .00071,.028 .098,.048 .11
+mistake,damping 0.01,.002 .002,9e-4 .003,5.5e-5 .00014,4.6e-5 .00092,5e-5 .001,1.6e-7 3.3e-6,5e-4 .01,,.037 .18,4.9e-5 .00096,.0029 .0071,.94 .98
+mistake,rates half a step late,0 2e-5,0 .0036,0 .0024,0 .00065,0 3e-4,0 .00041,,0 .00024,0 .00014,0 .0039,0 .0021,0 .0013
+mistake,rates half a step early,0 2e-5,0 .0036,0 .0024,0 .00065,0 3e-4,0 .00041,,0 .00024,0 .00014,0 .0039,0 .0021,0 .0013
+mistake,start in world rates,,.83 1.3,1.1 1.5,.16 1.6,.14 1.4,.17 1.7,.1 1,.13 1.3,.00027 .00068,.13 1.3,.99 1.3,1.5 1.4
+mistake,inertia in world axes,,.073 .25,.21 .53,.0014 .028,3.6e-5 .00079,.00057 .012,.00018 .0036,.00088 .018,.0043 .022,.0033 .067,.16 .4,.31 .49
+mistake,start transposed,,.32 .0059,2 0,1.6 0,.45 0,.1 0,2.7 0,2.9 0,.22 0,3.1 0,3.1 0,3.1 .63
+mistake,rates in degrees,0 56,0 56,0 56,0 56,0 56,0 56,0 56,0 56,0 56,0 52,0 54,0 56
+mistake,transposed,3.1 0,.27 0,2.7 0,1.5 0,.31 0,.0032 0,2.9 0,2.9 0,.58 0,3.1 0,3.1 0,3.1 0
+mistake,start in order xyzw,3.1 0,2 .29,2 0,2.6 0,2.1 0,2 0,2.4 0,2.7 0,2.5 0,2 0,2.8 0,1.9 .16
+mistake,start in order wxyz,3.1 0,2 .99,2 0,2.6 0,2.1 0,2 0,2.4 0,2.7 0,2.5 0,2 0,2.8 0,1.9 .4
+mistake,order xyzw,2.7 0,2.4 0,1.8 0,2.6 0,2 0,2 0,2.4 0,2.6 0,2.7 0,2.1 0,3 0,1.7 0
+mistake,axes y up,2.5 1.4,3.1 1.4,1.1 1.3,2.6 .25,2.6 1.2,1.9 .98,1.9 1.4,.78 1.3,3 1.4,2 1.2,1.4 1,2.6 .82
+mistake,reversed rates,0 2,0 2,0 2,0 2,0 2,0 2,0 2,0 2,0 2,0 1.8,0 1.9,0 2
+mistake,start in degrees,2 .98,.43 .69,.78 .98,.098 .98,.098 .98,.097 .98,.098 .98,.098 .98,.39 .98,.098 .98,.73 .95,.97 .82
+mistake,factor one half,2 0,.54 .065,.79 0,.099 0,.1 0,.099 0,.1 0,.1 0,.4 0,.096 0,.75 0,1 .2
+mistake,sleep,2 1,.52 1,.79 1,.099 1,.1 1,.099 1,.1 1,.1 1,.4 1,.096 .92,.75 .97,1.1 1
+mistake,frozen motion,2 .0051,.52 .53,.79 .35,.099 .013,.1 .0059,.099 .0081,.1 .0018,.1 .0049,.4 .011,.096 .079,.75 .31,1.1 .39
+mistake,world y up,1.6 0,1.6 0,1.6 0,1.6 0,1.6 0,1.6 0,1.6 0,1.6 0,1.6 0,1.6 0,1.6 0,1.6 0
+mistake,world turned the wrong way,1.6 0,1.6 0,1.6 0,1.6 0,1.6 0,1.6 0,1.6 0,1.6 0,1.6 0,1.6 0,1.6 0,1.6 0
+mistake,start in a world with y up,1.6 0,1.6 .44,1.6 0,1.6 0,1.6 0,1.6 0,1.6 0,1.6 0,1.6 0,1.6 0,1.6 0,1.6 .18
+mistake,damping 0.2,.039 .039,.018 .057,.0011 .0028,.00091 .018,.00099 .02,3.3e-6 6.6e-5,.0094 .18,1e-6 2e-5,.3 .98,.00097 .019,.056 .13,1.1 1
+mistake,damping 0.1,.02 .02,.0089 .029,.00055 .0014,.00046 .0092,5e-4 .01,1.6e-6 3.3e-5,.0048 .095,5e-7 1e-5,.23 .86,.00049 .0096,.029 .068,1.1 1
+mistake,R I for R I R',.0082 .02,.28 .89,.6 1.2,.0052 .1,.0051 .1,.0048 .098,.0045 .09,.0078 .16,.0044 .022,.0051 .1,.23 .52,1.1 1.4
+mistake,damping 0.05,.01 .01,.0045 .015,.00028 7e-4,.00023 .0046,.00025 .005,8.2e-7 1.6e-5,.0025 .049,2.5e-7 5e-6,.15 .63,.00024 .0048,.014 .035,1.1 1
+mistake,no gyroscopic term + damping 0.05,.011 .011,.014 .057,.14 .35,.00069 .014,.00039 .0078,4e-4 .0081,.0025 .049,.00025 .0049,.15 .63,.0031 .062,.11 .26,1.1 1
+mistake,inverted inertia,.016 .019,2.7 36,.29 .72,.0017 .035,.00057 .011,.00072 .015,.00018 .0036,6e-4 .012,.0073 .037,.001 .019,.17 .42,1.1 65
+mistake,a step late,.01 3.9e-5,.0082 .0072,.01 .0047,.0099 .0013,.01 .00059,.0099 .00081,.01 .00018,.01 .00048,.01 .00029,.0093 .0079,.0097 .0042,.0088 .0027
+mistake,a step early,.01 3.9e-5,.0083 .0072,.01 .0047,.0099 .0013,.01 .00059,.0099 .00081,.01 .00018,.01 .00048,.01 .00029,.0092 .0079,.0097 .0042,.0088 .0027
+mistake,sign of the gyroscopic term,.0074 .0089,.026 .1,.26 .64,.0013 .026,.00059 .012,.00081 .016,.00018 .0037,5e-4 .0099,.0042 .021,.0062 .12,.22 .5,.24 .4
+mistake,world rates,0 .0054,0 2,0 1.5,0 1.6,0 1.4,0 1.7,0 1,0 1.3,0 .022,0 1.2,0 1.4,0 1.4
+mistake,no gyroscopic term,.0042 .0051,.014 .056,.14 .35,.00065 .013,3e-4 .0059,4e-4 .0081,9.2e-5 .0018,.00025 .0049,.0022 .011,.0031 .062,.11 .26,.11 .18
+mistake,half a step late,.005 2e-5,.0041 .0036,.0051 .0024,.005 .00065,.005 3e-4,.0049 .00041,.005 9.2e-5,.005 .00024,.005 .00014,.0046 .0039,.0048 .0021,.0044 .0013
+mistake,half a step early,.005 2e-5,.0041 .0036,.0051 .0024,.005 .00065,.005 3e-4,.0049 .00041,.005 9.2e-5,.005 .00024,.005 .00014,.0046 .0039,.0048 .0021,.0044 .0013
+mistake,wrong side,.003 0,.99 .21,1.1 0,.16 0,.14 0,.17 0,.1 0,.13 0,.0044 0,.12 0,1.1 0,1.5 .31
+"""
+# END MOTIONS
+
+
+def test_rotation(capsys):
+    lines = []
+    code = run([], lines.append)
+    with capsys.disabled():
+        print("", *lines, sep="\n")
+    assert code == 0, "\n".join(map(str, lines))
+
+
+if __name__ == "__main__":
+    sys.exit(run(sys.argv[1:]))
