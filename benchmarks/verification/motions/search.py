@@ -288,6 +288,12 @@ LONGER: dict[str, int] = {
 """The first of `LENGTHS` that is tried: motions that are longer than a mistake needs show more of it."""
 
 
+def require_seed(seed: object) -> None:
+    """Raise `BadInput` if a seed is not an integer of 0 or more."""
+    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
+        raise BadInput("seed", repr(seed), "an integer of 0 or more")
+
+
 @cache
 def fresh(seed: int) -> tuple[Motion, ...]:
     """Return the motions of a seed, one of each family, in the order of `FAMILIES`. Each is solved twice (`confirm`).
@@ -311,8 +317,7 @@ def choose(seed: int) -> list[Motion]:
     In each length, beginning with the shortest one of the family, up to `TRIES` motions are drawn, and the first one is taken
     whose mistakes exceed `ENOUGH`; the best of all if there is none. Each family has a generator of its own.
     """
-    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
-        raise BadInput("seed", repr(seed), "an integer of 0 or more")
+    require_seed(seed)
     random = {name: Random([seed, *name.encode()]) for name in FAMILIES}
     best = dict[str, tuple[float, Motion]]()
     for i in range(len(LENGTHS)):
