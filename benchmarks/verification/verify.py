@@ -192,14 +192,7 @@ def verify(
         raise BadInput("only", repr(sorted(unused)[0]), f"checks of {' and '.join(sorted(kinds))}: {allowed}")
     if pairs and only and "pairs" not in only:
         raise BadInput("pairs", f"{', '.join(pairs)!r} without the check of pairs", "pairs in --only, or no --only")
-    if seed is not None:
-        if only and not set(only) & set(MOTION_CHECKS):
-            raise BadInput(
-                "seed", f"{seed!r} without a check by motions", f"{', '.join(MOTION_CHECKS)} in --only, or no --only"
-            )
-        from .motions.search import require_seed  # here: recordings need no kernels
-
-        require_seed(seed)
+    _require_motions(seed, only)
     results: list[Verification] = []
     if files := [subject.path for subject in expanded if subject.kind is Kind.MODEL and subject.path]:
         from .bodies import verify_files
@@ -217,6 +210,17 @@ def verify(
 
             results += [_verify_method(method, subject.kind, only, pairs, tell, seed) for method in select([subject.text])]
     return results + [_verify_method(method, Kind.METHOD, only, pairs, tell, seed) for method in methods]
+
+
+def _require_motions(seed: int | None, only: Sequence[str]) -> None:
+    """Raise `BadInput` for a seed that is not one, or that no check uses."""
+    if seed is None:
+        return
+    if only and not set(only) & set(MOTION_CHECKS):
+        raise BadInput("seed", f"{seed!r} without a check by motions", f"{', '.join(MOTION_CHECKS)} in --only, or no --only")
+    from .motions.search import require_seed  # here: recordings need no kernels
+
+    require_seed(seed)
 
 
 def _verify_method(
