@@ -134,18 +134,15 @@ def tolerance(motion: Motion, order: int | None, in_single: bool = False) -> tup
     Order 3 and a program that chooses its steps (None) have the tolerances of order 2. Published motions have those of their
     files, and fresh ones those that are measured with the same motion in the axes of the seed.
     """
-    attitude, rates, more = (_published if motion.seed is None else _measured)(motion.name, motion.seed, tested_order(order))
+    order = tested_order(order)
+    attitude, rates, more = _published(motion.name, order) if motion.seed is None else _limits(motion.seed, order)[motion.name]
     return (attitude + more, rates + more) if in_single else (attitude, rates)
 
 
-def _published(name: str, seed: int | None, order: int) -> tuple[float, float, float]:
+def _published(name: str, order: int) -> tuple[float, float, float]:
     kept = read(name)
     (row,) = (row for row in kept["tolerance"] if (row["order"], row["angle"]) == (order, ANGLES[-1]))
     return row["attitude"], row["rates"], kept["single"]
-
-
-def _measured(name: str, seed: int, order: int) -> tuple[float, float, float]:
-    return _limits(seed, order)[name]
 
 
 @cache
