@@ -10,7 +10,7 @@ For example:
             print(finding.case, finding.verdict, finding.error, finding.allowed, finding.mistake)
 """
 
-from .finding import CHECKS, Cause, Finding, Verdict, Verification
+from .finding import CHECKS, Cause, Finding, Standing, Verdict, Verification
 from .verify import Kind, kind_of, verify
 
-__all__ = ["CHECKS", "Cause", "Finding", "Kind", "Verdict", "Verification", "kind_of", "verify"]
+__all__ = ["CHECKS", "Cause", "Finding", "Kind", "Standing", "Verdict", "Verification", "kind_of", "verify"]

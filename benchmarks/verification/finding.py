@@ -22,6 +22,17 @@ EXIT_CODES = {Verdict.RIGHT: 0, Verdict.WRONG: 1, Verdict.UNDECIDED: 3, Verdict.
 """Exit code of a command by its verdict; bad input is 2."""
 
 
+class Standing(StrEnum):
+    """How a finding compares with a file of known errors (`known`). Other findings agree with the file."""
+
+    KNOWN = "known"
+    """It is wrong or undecided as recorded."""
+    NEW = "new"
+    """It is worse than recorded, has another mistake, or is not tested any more."""
+    BETTER = "better"
+    """It was recorded as wrong, and its error is smaller now, or it is right."""
+
+
 @dataclass(frozen=True)
 class Cause:
     """A mistake, or several at once, that explains an error.
@@ -75,6 +86,8 @@ class Finding:
         Mistakes that explain the error; several if they explain it equally well, none if no mistake of the catalogue does.
     detail
         What decides an undecided case, why a case was not tested, or what a wrong case does.
+    standing, change
+        How it compares with a file of known errors, and a sentence on what changed; None and "" if nothing did.
     """
 
     subject: str
@@ -87,11 +100,50 @@ class Finding:
     by: str = ""
     causes: tuple[Cause, ...] = ()
     detail: str = ""
+    standing: Standing | None = None
+    change: str = ""
 
     @property
     def mistake(self) -> str:
         """The key of the mistake that explains the error; "" if there is none, or several explain it equally well."""
         return self.causes[0].key if len(self.causes) == 1 else ""
+
+
+@dataclass(frozen=True)
+class MotionFinding(Finding):
+    """The finding on an exact motion that was run.
+
+    Attributes
+    ----------
+    errors, tolerances
+        Errors and tolerances of the attitude, rad, and of the rates, relative to the largest rate. `error` and `allowed` are
+        those of the two with the larger ratio.
+    """
+
+    errors: tuple[float, float] = (math.nan, math.nan)
+    tolerances: tuple[float, float] = (math.nan, math.nan)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How the exact motions of a program, an engine or a method were run.
+
+    Attributes
+    ----------
+    order
+        The declared order; None for a subject that chooses its steps.
+    angle
+        |w| h, rad.
+    precision
+        "double" or "single".
+    """
+
+    order: int | None
+    angle: float
+    precision: str
+
+    def __str__(self) -> str:
+        return f"{'adaptive' if self.order is None else self.order},{self.angle:g},{self.precision}"
 
 
 CHECKS: Mapping[str, str] = MappingProxyType(
@@ -134,6 +186,12 @@ class Verification:
         Sentences on data that was not used or not compared, and on assumptions.
     details
         Values that belong to the kind of the subject, such as the quantities of a recording.
+    settings
+        How exact motions were run; None for recordings, model files and programs that do not run.
+    compared
+        Whether the findings were compared with a file of known errors.
+    change
+        A sentence for a pull request on what changed since that file; "" if nothing did.
     """
 
     subject: str
@@ -142,6 +200,9 @@ class Verification:
     reason: str = ""
     notes: Sequence[str] = ()
     details: object = None
+    settings: Settings | None = None
+    compared: bool = False
+    change: str = ""
 
     @property
     def verdict(self) -> Verdict:
@@ -150,16 +211,46 @@ class Verification:
 
     @property
     def exit_code(self) -> int:
-        """The exit code of a command that verifies this subject."""
-        return EXIT_CODES[self.verdict]
+        """The exit code of a command that verifies this subject.
+
+        With a file of known errors, it is 1 if an error is new, and 3 if a case is undecided that was not.
+        """
+        if not self.compared:
+            return EXIT_CODES[self.verdict]
+        if self.new:
+            return EXIT_CODES[Verdict.WRONG]
+        undecided = any(finding.verdict is Verdict.UNDECIDED and finding.standing is None for finding in self.findings)
+        return EXIT_CODES[Verdict.UNDECIDED if undecided else Verdict.RIGHT]
+
+    @property
+    def new(self) -> list[Finding]:
+        """The findings that are new since the file of known errors was written."""
+        return [finding for finding in self.findings if finding.standing is Standing.NEW]
+
+    @property
+    def known(self) -> list[Finding]:
+        """The wrong findings that are not worse than the file of known errors says."""
+        kept = (Standing.KNOWN, Standing.BETTER)
+        return [finding for finding in self.findings if finding.verdict is Verdict.WRONG and finding.standing in kept]
 
     @property
     def sentence(self) -> str:
         """The verdict in one sentence."""
         if self.kind == "recordings":  # the reason says which one is wrong
-            return f"{self.verdict}: {self.reason}"
+            return f"{self.verdict}{self._standing}: {self.reason}"
         subject = f"The loading of {self.subject}" if self.kind == "model file" else self.subject
-        return f"{subject} is {self.verdict}" + (f": {self.reason}" if self.reason else "")
+        return f"{subject} is {self.verdict}{self._standing}" + (f": {self.reason}" if self.reason else "")
+
+    @property
+    def _standing(self) -> str:
+        """How many errors are known and how many are new, as a part of the sentence."""
+        known, new = (
+            f"{len(some)} {name}{'s' * (len(some) != 1)}" if some else ""
+            for some, name in ((self.known, "known error"), (self.new, "new failure"))
+        )
+        if new:
+            return f", with {' and '.join(filter(None, (new, known)))}"
+        return f" as recorded, with {known}" if known else ""
 
 
 def uncapitalised(sentence: str) -> str:

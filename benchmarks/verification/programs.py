@@ -14,11 +14,12 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from conservative.attitude import Array, to_quaternion
+from conservative.attitude import Array, angle_between, to_quaternion
 from conservative.errors import IntegrationFailed, Unsupported
 from conservative.grid import Grid
 from conservative.method import Method
@@ -36,10 +37,11 @@ from . import protocol
 from .compare import Compared, compare_answers
 from .explain import PROGRAM_KINDS, diagnose
 from .explanation import HALF, OWN_ERROR, Explanation
-from .finding import Finding, Verdict, Verification, uncapitalised
+from .finding import Cause, Finding, MotionFinding, Settings, Verdict, Verification, uncapitalised
+from .mistakes import BY_KEY
 from .motions.files import of_seed, tolerance
 from .motions.motion import Motion, load
-from .motions.programs import ORDERS, PARTS
+from .motions.programs import ANGLES, ORDERS, PARTS
 
 PATIENCE = 30.0
 """Time in s that a program may take to start, and for each answer. A program that takes longer does not answer."""
@@ -75,6 +77,11 @@ ALIKE, ROUNDED = 3.0, 1e-9
 """Mistakes explain equally well if they leave shares within this factor; smaller shares are rounding."""
 LEAST = 0.1
 """Smallest share of the failing motions that are searched after a first mistake: in few motions another one can look alike."""
+TURN, TURNS = "fast_turn", (2.0, 2.5)
+"""A motion with constant rates, and turns in a step, rad, that show whether the turn is limited. Engines limit it to pi / 4, as
+installed, or to pi / 2."""
+EQUAL = 1e-6
+"""Largest relative difference of two turns that are the same limit. Two steps of any method differ by far more."""
 Solve = Callable[[Scene, Grid], Trajectory]
 """Integrates a scene. It raises `Unsupported` or `IntegrationFailed`; its samples need not be plausible."""
 
@@ -234,7 +241,7 @@ def explain_motions(failing: Sequence[Ran], right: Sequence[Ran] = ()) -> list[N
     A mistake is searched in one motion, with numbers that are fitted to it. It is then applied to all others with the same
     numbers, which the motions that it nearly explains make more precise. Of several mistakes the one is named that explains
     most, less the `right` motions that it would make wrong. Motions that it does not explain are searched next, up to `ROUNDS`
-    of them.
+    of them; after a motion that nothing explains, the shortest ones.
     """
     rest = {run.motion.name: run for run in sorted(failing, key=_rank) if not run.ended}
     named: dict[tuple[tuple[str, ...], ...], Named] = {}
@@ -248,6 +255,7 @@ def explain_motions(failing: Sequence[Ran], right: Sequence[Ran] = ()) -> list[N
         simplest = sorted((e for e in tried if e.explains), key=lambda e: (e.numbers, len(e.keys), e.share))[:CANDIDATES]
         applied = [_apply(explanation, list(rest.values()), right) for explanation in simplest]
         if not applied or max(candidate.score for candidate in applied) <= 0:
+            searched.sort(key=_turns)  # of several mistakes at once, fewer have begun in a shorter motion, such as sleep
             continue
         best = max(applied, key=lambda candidate: candidate.rank)
         good = [candidate for candidate in applied if (candidate.motions, candidate.rank) == (best.motions, best.rank)]
@@ -265,6 +273,11 @@ def explain_motions(failing: Sequence[Ran], right: Sequence[Ran] = ()) -> list[N
 def _rank(ran: Ran) -> tuple[bool, bool, float]:
     """Return the place in the search: free bodies with three moments first, then by how clear and how small the error is."""
     return bool(ran.motion.features), not _is_generic(ran.motion), abs(math.log10(ran.ratio) - CLEAR)
+
+
+def _turns(ran: Ran) -> int:
+    """Return the length of a motion, in steps in which it turns by about 0.1 rad."""
+    return ran.motion.steps * ran.motion.samples
 
 
 @dataclass(frozen=True)
@@ -332,23 +345,42 @@ def motion_findings(subject: str, answers: Answers) -> tuple[list[Finding], list
     if failing and len(explained) < len(failing) / 2:
         order = measure_order(answers)
         lower = _of_lower_order(answers, failing, order)
-    findings = []
+    findings = list[Finding]()
     for run in answers.ran:
         name = run.motion.name
-        k = int(np.argmax(run.error / run.allowed))
-        measured = float(run.error[k]), float(run.allowed[k]), ("rad", "of the largest rate")[k], "order"  # of a `Finding`
-        if run not in failing:
-            detail = f"{_above(run.ratio)} the tolerance, falls as h^{near[name]:.2f}" if name in near else ""
-            findings.append(Finding(subject, "motions", name, Verdict.RIGHT, *measured, detail=detail))
+        verdict, causes, detail = Verdict.RIGHT, tuple[Cause, ...](), ""
+        if name in near:
+            detail = f"{_above(run.ratio)} the tolerance, falls as h^{near[name]:.2f}"
         elif name in lower:
-            findings.append(Finding(subject, "motions", name, Verdict.RIGHT, *measured, detail=lower[name]))
-        else:
+            detail = lower[name]
+        elif run in failing:
             causes = tuple(explanation.cause for explanation in explained[name].explanations) if name in explained else ()
-            findings.append(Finding(subject, "motions", name, Verdict.WRONG, *measured, causes=causes, detail=run.ended))
+            verdict, detail = Verdict.WRONG, run.ended
+        k = int(np.argmax(run.error / run.allowed))
+        findings.append(
+            MotionFinding(
+                subject,
+                "motions",
+                name,
+                verdict,
+                float(run.error[k]),
+                float(run.allowed[k]),
+                ("rad", "of the largest rate")[k],
+                "order",
+                causes,
+                detail,
+                errors=_pair(run.error),
+                tolerances=_pair(run.allowed),
+            )
+        )
     findings += [
         Finding(subject, "motions", name, Verdict.NOT_TESTED, detail=reason) for name, reason in answers.unsupported.items()
     ]
     return findings, named, order
+
+
+def _pair(values: Array) -> tuple[float, float]:
+    return float(values[0]), float(values[1])
 
 
 def _above(ratio: float) -> str:
@@ -367,6 +399,56 @@ def _of_lower_order(answers: Answers, failing: Sequence[Ran], order: float) -> d
         if (run.error <= tolerance(run.motion, lower, answers.single)).all():
             reasons[run.motion.name] = f"within the tolerance of order {lower}"
     return reasons
+
+
+def turn_finding(subject: str, answers: Answers) -> Finding | None:
+    """Return the finding on a program that limits the turn in a step, rad; None if it does not, or cannot run the motion.
+
+    In steps of 0.01 rad no motion shows this limit, but a fast body in the step of a game does. A body that turns steadily has
+    constant rates for every step, and its attitude turns further in a longer step, however large the error of the method is.
+    """
+    run = next((run for run in answers.ran if run.motion.name == TURN and not run.ended), None)
+    if run is None:
+        return None
+    scene, speed = run.motion.scene, float(np.linalg.norm(run.motion.rates))
+    turned, spun = np.zeros(len(TURNS)), np.zeros(len(TURNS))
+    for k, turn in enumerate(TURNS):
+        try:
+            trajectory = answers.solve(scene, Grid(turn / speed, 1, 1))
+        except (Unsupported, IntegrationFailed):
+            return None
+        if len(trajectory.t) < 2:
+            return None
+        turned[k] = float(angle_between(trajectory.R_WB[:1], trajectory.R_WB[1:2])[0])
+        spun[k] = float(np.linalg.norm(trajectory.w_WB_B[1])) / speed * turn
+    limits = [
+        float(values[0]) if abs(values[1] - values[0]) <= EQUAL * values[0] and values[0] < (1 - EQUAL) * TURNS[0] else math.nan
+        for values in (turned, spun)
+    ]
+    # The rates show it best: single precision rounds the turn of Box3D's attitude to 44.9 degrees.
+    least = next((limit for limit in reversed(limits) if limit > 0), math.nan)  # False for nan
+    if math.isnan(least):
+        return None
+    what = "The turn of the attitude" if math.isnan(limits[1]) else "The turn"
+    sentence = (
+        f"{what} in a step is limited to {least:.3g} rad ({math.degrees(least):.3g} degrees): {100 * least:.3g} rad/s at 0.01 s"
+    )
+    cause = Cause(("rate limit",), sentence, numbers=MappingProxyType({"turn": least}), remedy=BY_KEY["rate limit"].remedy)
+    errors = max(0.0, TURNS[0] - float(turned[0])), max(0.0, 1 - float(spun[0]) / TURNS[0])
+    k = int(errors[1] > EQUAL)
+    return MotionFinding(
+        subject,
+        "motions",
+        f"{TURN} in long steps",
+        Verdict.WRONG,
+        errors[k],
+        EQUAL,
+        ("rad", "of the largest rate")[k],
+        "constant rates",
+        (cause,),
+        errors=errors,
+        tolerances=(EQUAL, EQUAL),
+    )
 
 
 def order_finding(subject: str, answers: Answers, order: float) -> Finding:
@@ -417,7 +499,7 @@ def verify_method(
     """
     subject = subject or method.name
     single = bits_of(method) == 32
-    findings, named, order = list[Finding](), list[Named](), math.nan
+    findings, named, limits, order = list[Finding](), list[Named](), list[str](), math.nan
     if {"motions", "order", "repeatability"} & set(checks):
         principal = isinstance(method, AdapterMethod)
         answers = run_motions(
@@ -432,6 +514,9 @@ def verify_method(
         if "motions" in checks:
             some, named, order = motion_findings(subject, answers)
             findings += some
+            if (limited := turn_finding(subject, answers)) is not None:
+                findings.append(limited)
+                limits.append(uncapitalised(limited.causes[0].sentence))
         if "order" in checks and not named:
             order = measure_order(answers) if math.isnan(order) else order
             findings.append(order_finding(subject, answers, order))
@@ -441,11 +526,15 @@ def verify_method(
         from .pairs import verify_pairs
 
         findings += verify_pairs(method, pairs, lambda what: tell(0.5, f"{subject}: {what}"), subject)
-    return Verification(subject, kind, findings, summary(findings, named))
+    settings = Settings(method.order, ANGLES[-1], "single" if single else "double")
+    return Verification(subject, kind, findings, summary(findings, named, limits), settings=settings)
 
 
-def summary(findings: Sequence[Finding], named: Sequence[Named]) -> str:
-    """Return the reason of the verdict, with the number of cases of each check that are right."""
+def summary(findings: Sequence[Finding], named: Sequence[Named], limits: Sequence[str] = ()) -> str:
+    """Return the reason of the verdict, with the number of cases of each check that are right.
+
+    `limits` are sentences on what only long steps show.
+    """
     parts = []
     for check in dict.fromkeys(finding.check for finding in findings):
         some = [finding for finding in findings if finding.check == check and finding.verdict is not Verdict.NOT_TESTED]
@@ -469,7 +558,7 @@ def summary(findings: Sequence[Finding], named: Sequence[Named]) -> str:
         f"(explains {len(group.motions)} of {failing} failing motions)"
         for group in named
     ]
-    return "; ".join([*reasons, ", ".join(parts)])
+    return "; ".join([*reasons, *limits, ", ".join(parts)])
 
 
 UNKNOWN = "no known mistake explains its motion"

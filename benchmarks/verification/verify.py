@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
@@ -15,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from conservative import registry
 from conservative.check import choice
 from conservative.errors import BadInput
+from conservative.files import text_file
 from conservative.programs import list_programs
 from conservative.scene import Scene
 
@@ -125,6 +127,8 @@ def verify(
     error: float | None = None,
     rates: str | None = None,
     seed: int | None = None,
+    record: str | os.PathLike[str] | None = None,
+    known: str | os.PathLike[str] | None = None,
     tell: Tell = lambda share, what: None,
     **reading: Any,
 ) -> list[Verification]:
@@ -150,6 +154,10 @@ def verify(
         `recordings.table.Options`.
     seed
         For methods, engines and programs: the fresh motions of this seed instead of the published ones.
+    record
+        File of known errors to write (`known`): all errors of this run are known. A file of another kind is not replaced.
+    known
+        File of known errors to compare with: the `standing` of each finding is known, new or better.
     tell
         Called with the share of the work that is done and the next piece of it.
 
@@ -161,9 +169,12 @@ def verify(
     Raises
     ------
     BadInput
-        A subject, a body or an option is unknown, or an option is not used by any subject.
+        A subject, a body or an option is unknown, or an option is not used by any subject. Or a file of known errors has
+        another form, other subjects or other settings, or a subject that does not run would be recorded.
     MissingEngine
         An engine is not installed.
+    NotWritten
+        The file of known errors cannot be written.
     """
     listed = [subjects] if isinstance(subjects, str | os.PathLike) or not isinstance(subjects, Sequence) else list(subjects)
     if not listed:
@@ -192,7 +203,51 @@ def verify(
         raise BadInput("only", repr(sorted(unused)[0]), f"checks of {' and '.join(sorted(kinds))}: {allowed}")
     if pairs and only and "pairs" not in only:
         raise BadInput("pairs", f"{', '.join(pairs)!r} without the check of pairs", "pairs in --only, or no --only")
-    _require_motions(seed, only)
+    _require_motions(seed, only, record or known)
+    with _known_errors(record, known, only, bool(pairs)) as compare:
+        return compare(_verify_all(expanded, methods, body, engines, only, pairs, search, start, error, seed, tell, reading))
+
+
+@contextmanager
+def _known_errors(
+    record: str | os.PathLike[str] | None, known: str | os.PathLike[str] | None, only: Sequence[str], some_pairs: bool
+) -> Iterator[Callable[[list[Verification]], list[Verification]]]:
+    """Yield the comparison of results with a file of known errors, which is read, or opened for writing, before any work."""
+    from . import known as known_errors  # here: most commands have no such file
+
+    if record is not None and known is not None:
+        raise BadInput("record", "a file to write and a file to compare with", "one of them")
+    if known is not None:
+        blocks = known_errors.read(Path(known))
+        yield lambda results: known_errors.compare(results, blocks, only, some_pairs)
+    elif record is not None:
+        known_errors.require_own(Path(record))
+        with text_file(Path(record), "record") as stream:
+
+            def write(results: list[Verification]) -> list[Verification]:
+                new = known_errors.blocks_of(results)
+                known_errors.write(stream, new)
+                return known_errors.compare(results, new, only, some_pairs)
+
+            yield write
+    else:
+        yield lambda results: results
+
+
+def _verify_all(
+    expanded: Sequence[Subject],
+    methods: Sequence[Method],
+    body: str | os.PathLike[str] | Scene | None,
+    engines: Sequence[str],
+    only: Sequence[str],
+    pairs: Sequence[str],
+    search: Sequence[Path],
+    start: str,
+    error: float | None,
+    seed: int | None,
+    tell: Tell,
+    reading: Mapping[str, Any],
+) -> list[Verification]:
     results: list[Verification] = []
     if files := [subject.path for subject in expanded if subject.kind is Kind.MODEL and subject.path]:
         from .bodies import verify_files
@@ -212,12 +267,14 @@ def verify(
     return results + [_verify_method(method, Kind.METHOD, only, pairs, tell, seed) for method in methods]
 
 
-def _require_motions(seed: int | None, only: Sequence[str]) -> None:
-    """Raise `BadInput` for a seed that is not one, or that no check uses."""
+def _require_motions(seed: int | None, only: Sequence[str], known: str | os.PathLike[str] | None) -> None:
+    """Raise `BadInput` for a seed that is not one, that no check uses, or that is given with a file of known errors."""
     if seed is None:
         return
     if only and not set(only) & set(MOTION_CHECKS):
         raise BadInput("seed", f"{seed!r} without a check by motions", f"{', '.join(MOTION_CHECKS)} in --only, or no --only")
+    if known is not None:
+        raise BadInput("seed", f"{seed!r} and known errors, which are of the published motions", "one of them")
     from .motions.search import require_seed  # here: recordings need no kernels
 
     require_seed(seed)

@@ -45,6 +45,8 @@ FILES = {
     "errors.svg": SVG_MARK,
 }
 """The files of `--out`, and how each begins. Only a recording has errors over time."""
+MARK = "# Known errors on exact motions."
+"""The beginning of a file of known errors (`known.MARK`, which `--help` does not import)."""
 LISTS = ("only", "pairs", "engines")
 """Options that take names between commas."""
 
@@ -52,13 +54,18 @@ LISTS = ("only", "pairs", "engines")
 @click.command(
     cls=OutputCommand,
     short_help="Verify a recording, an engine, a program or a model file.",
-    codes={1: "a subject is wrong", 3: "no subject is wrong, and one is undecided or not tested"},
+    codes={
+        1: "a subject is wrong, or with --known, a failure is new",
+        3: "no subject is wrong, and one is undecided or not tested",
+    },
     epilog=epilog(
         "conservative verify run.csv --body my_body.toml                 is this recorded motion right?",
         "conservative verify a.csv b.csv --body my_body.toml             they disagree: which one is wrong?",
         "conservative verify ./my_engine 'python my_engine.py'           programs",
         "conservative verify mujoco@3.12.0 drake:discrete                engines",
         "conservative verify ./my_engine --seed 7                        by motions that nobody has seen",
+        "conservative verify ./my_engine --record known.txt              its errors are known, later ones fail:",
+        "conservative verify ./my_engine --known known.txt",
         "conservative verify my_robot.urdf --engines mujoco,drake        do they load the body that the file describes?",
         "conservative verify mujoco --only pairs --scripts scripts       a script for each pair that differs",
         "conservative verify flight.csv --body brick_flip --euler zyx --rates world --error 1e-3 --json",
@@ -119,6 +126,20 @@ LISTS = ("only", "pairs", "engines")
     completion.engine_lists,
 )
 @click.option("--search", multiple=True, type=FilePath(), help="Model files: folder of meshes and packages; repeatable.")
+@option(
+    "record",
+    "Write today's errors and mistakes into this file of known errors. The exit code is 0 if the subjects run.",
+    type=Output(MARK),
+    envvar="ROTATION_RECORD",
+    metavar="FILE",
+)
+@option(
+    "known",
+    "Compare with this file of known errors. The exit code is 1 only for a new failure.",
+    type=FilePath(),
+    envvar="ROTATION_KNOWN",
+    metavar="FILE",
+)
 @json_option
 @click.option("--junit", type=Output('name="conservative verify"'), help="Write a JUnit report.")
 @click.option("--markdown", type=Output(FILES["verify.md"]), help="Write the tables as Markdown.")
@@ -146,7 +167,9 @@ def verify(
     files. Two recordings are also compared with each other. With --engines and no SUBJECT, engines load the small model files
     of this package, each of which tests one rule of a format.
 
-    The exit code is 0 if all subjects are right, 1 if one is wrong, and 3 if one is undecided or not tested.
+    The exit code is 0 if all subjects are right, 1 if one is wrong, and 3 if one is undecided or not tested. With --known, it
+    is 1 only if an error is larger than in the file, has another mistake, or is new. If a motion changed, the last line is a
+    sentence for a pull request.
     """
     if picture is not None:
         require_extra("conservative verify --picture", "report")
@@ -182,6 +205,9 @@ def verify(
         document = section.build(verifications, {} if kinds == {Kind.RECORDING} else facts())
         written = write(document, **made)
     show(replace(written, failures=written.failures[len(document.failures) :]), as_json)
+    for verification in verifications:  # not a part of the document, whose lines are wrapped
+        if verification.change and not as_json:
+            click.echo(verification.change)
     if scripts is not None:  # after the result, which a script that cannot be written must not cost
         write_scripts(verifications, scripts, ctx.meta["force"])
     ctx.exit(section.exit_code(verifications))
@@ -197,7 +223,7 @@ def used(values: Mapping[str, Any], kinds: Collection[Kind]) -> dict[str, Any]:
     from conservative.benchmarks.verification.verify import USED_BY, Kind
 
     ctx, options = click.get_current_context(), dict[str, Any]()
-    users_of = USED_BY | {"scripts": USED_BY["pairs"], "only": tuple(Kind)}
+    users_of = USED_BY | {"scripts": USED_BY["pairs"], **dict.fromkeys(("only", "record", "known"), tuple(Kind))}
     for name, value in values.items():
         if ctx.get_parameter_source(name) is ParameterSource.DEFAULT:
             continue

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
-from conservative.benchmarks.verification.finding import EXIT_CODES, Cause, Finding, Verdict, Verification
+from conservative.benchmarks.verification.finding import EXIT_CODES, Cause, Finding, Standing, Verdict, Verification
 
 from ..document.cells import DASH, bound, listed
 from ..document.model import Block, Cell, Check, Document, Emphasis, Grade, Item, Items, Paragraph, Row, Section, Table, filled
@@ -28,12 +28,26 @@ DECIDING = (Verdict.WRONG, Verdict.UNDECIDED, Verdict.NOT_TESTED, Verdict.RIGHT)
 """Verdicts in the order in which they decide the verdict on several subjects: only right ones together are right."""
 LISTED = 4
 """Cases that an item of a list names."""
+UNKNOWN = "no known mistake"
 TERMS = (
     "Right: the error is at most what is allowed. Undecided: the data does not decide. Not tested: the subject does not have "
     "what the case needs. A mistake explains an error if it leaves at most what is allowed."
 )
 """Explanation of the tables."""
-COLUMNS = ("subject", "check", "case", "verdict", "error", "allowed", "unit", "by", "mistakes", "explanation")
+COLUMNS = (
+    "subject",
+    "check",
+    "case",
+    "verdict",
+    "error",
+    "allowed",
+    "unit",
+    "by",
+    "mistakes",
+    "explanation",
+    "standing",
+    "change",
+)
 """Columns of findings as CSV."""
 OWN: Mapping[str, Callable[[Verification], Sequence[Block]]] = {"recording": recording_blocks, "recordings": two_blocks}
 """Blocks of kinds of subjects that have other data than cases, by `Verification.kind`."""
@@ -65,7 +79,7 @@ def build(verifications: Sequence[Verification], made: Mapping[str, str] | None 
 
     def blocks(make: Callable[[Verification], list[Block]], shown: Sequence[Verification]) -> list[Block]:
         parts = [
-            *([("Model files", body_blocks(models))] if models else []),
+            *([("Model files", filled(_standings(models), *body_blocks(models)))] if models else []),
             *((verification.subject, make(verification)) for verification in shown),
         ]
         return [*lead, *(parts[0][1] if len(order) == 1 or not others else filled(*(Section(*part) for part in parts)))]
@@ -74,7 +88,7 @@ def build(verifications: Sequence[Verification], made: Mapping[str, str] | None 
         "conservative verify",
         f"Verified: {', '.join(verification.subject for verification in verifications)}",
         [*blocks(details, others), Paragraph(TERMS, Emphasis.NOTE)],
-        brief=blocks(summary, [other for other in others if len(order) == 1 or other.verdict is not Verdict.RIGHT]),
+        brief=blocks(summary, [other for other in others if len(order) == 1 or _has_news(other)]),
         data={
             "verified": [verification.subject for verification in verifications],
             "verdict": order[0].verdict,
@@ -82,18 +96,24 @@ def build(verifications: Sequence[Verification], made: Mapping[str, str] | None 
             "subjects": [content(verification) for verification in verifications],
         },
         checks=[_check(verification.subject, finding) for verification in verifications for finding in verification.findings],
-        failures=[f"{verification.sentence}." for verification in order if verification.verdict is Verdict.WRONG],
+        failures=[f"{verification.sentence}." for verification in order if verification.exit_code == EXIT_CODES[Verdict.WRONG]],
     )
 
 
 def exit_code(verifications: Iterable[Verification]) -> int:
     """Return the exit code of a command: of a wrong subject if there is one, otherwise of an undecided or untested one."""
-    return EXIT_CODES[min((verification.verdict for verification in verifications), key=DECIDING.index)]
+    codes = [EXIT_CODES[verdict] for verdict in DECIDING]
+    return min((verification.exit_code for verification in verifications), key=codes.index)
+
+
+def _has_news(verification: Verification) -> bool:
+    return verification.verdict is not Verdict.RIGHT or any(finding.standing for finding in verification.findings)
 
 
 def content(verification: Verification) -> dict[str, Any]:
     """Return a verification for JSON: its fields, its verdict and its sentence."""
-    return {"sentence": verification.sentence, "verdict": verification.verdict, **vars(verification)}
+    code = verification.exit_code
+    return {"sentence": verification.sentence, "verdict": verification.verdict, "exit_code": code, **vars(verification)}
 
 
 def findings_text(verifications: Iterable[Verification]) -> str:
@@ -103,9 +123,8 @@ def findings_text(verifications: Iterable[Verification]) -> str:
     writer.writerow(COLUMNS)
     for verification in verifications:
         for finding in verification.findings:
-            mistakes = "; ".join(cause.key for cause in finding.causes)
-            plain = [getattr(finding, name) for name in COLUMNS[:-2]]
-            writer.writerow([*plain, mistakes, explanation(finding)])
+            plain = [getattr(finding, name) for name in COLUMNS[:-4]]
+            writer.writerow([*plain, _keys(finding), explanation(finding), finding.standing or "", finding.change])
     return stream.getvalue()
 
 
@@ -119,10 +138,17 @@ def errors_text(verifications: Sequence[Verification]) -> str:
 def summary(verification: Verification) -> list[Block]:
     """Return the reasons of the verdict on a subject: mistakes, open cases, the number of cases of each check, and notes."""
     if verification.kind in OWN:
-        return list(OWN[verification.kind](verification))
+        return filled(_standings([verification]), *OWN[verification.kind](verification))
     pairs, others = _pairs(verification)
     differ = _pair_blocks(pairs) if any(pair.verdict is Verdict.WRONG for pair in pairs) else []
-    return filled(mistakes(others), _remarks(others), _counts(verification), *differ, Items.of(verification.notes))
+    return filled(
+        _standings([verification]),
+        mistakes(others),
+        _remarks(others),
+        _counts(verification),
+        *differ,
+        Items.of(verification.notes),
+    )
 
 
 def details(verification: Verification) -> list[Block]:
@@ -154,6 +180,24 @@ def mistakes(findings: Iterable[Finding]) -> Items:
     wrong = [finding for finding in findings if finding.verdict is Verdict.WRONG]
     groups = sorted(grouped(wrong, lambda finding: (finding.check, named_by(finding))), key=lambda group: -len(group[1]))
     items = [Item(explanation(some[0]), _named(check, _cases_of(some)), True) for (check, _), some in groups]
+    return Items(items)
+
+
+def _standings(verifications: Iterable[Verification]) -> Items:
+    """Return what is new and what is better than a file of known errors, and how many errors are known by which mistakes."""
+    items = list[Item]()
+    for verification in verifications:
+        for standing in (Standing.NEW, Standing.BETTER):
+            changed = [finding for finding in verification.findings if finding.standing is standing]
+            groups = grouped(changed, lambda finding: (finding.check, finding.change))
+            items += [
+                Item(_named(_named(check, _cases_of(some)), change), str(standing), standing is Standing.NEW)
+                for (check, change), some in groups
+            ]
+        if verification.known:
+            counts = Counter((_keys(finding) or UNKNOWN, finding.check) for finding in verification.known)
+            causes = [f"{cause} ({check}: {count})" for (cause, check), count in counts.most_common()]
+            items.append(Item(", ".join(causes), f"{len(verification.known)} known"))
     return Items(items)
 
 
@@ -201,7 +245,11 @@ def grouped(findings: Iterable[Finding], key: Callable[[Finding], Key]) -> list[
 
 def named_by(finding: Finding) -> str:
     """Return the keys of the mistakes that explain a finding, or else its detail."""
-    return "; ".join(cause.key for cause in finding.causes) or finding.detail
+    return _keys(finding) or finding.detail
+
+
+def _keys(finding: Finding) -> str:
+    return "; ".join(cause.key for cause in finding.causes)
 
 
 def _cases_of(findings: Sequence[Finding]) -> str:
@@ -232,6 +280,7 @@ def _counts(verification: Verification) -> Table | None:
 
 
 def _cases(check: str, findings: Sequence[Finding]) -> Table:
+    compared = any(finding.standing for finding in findings)
     body: list[Row] = [
         [
             finding.case or finding.subject,
@@ -240,10 +289,12 @@ def _cases(check: str, findings: Sequence[Finding]) -> Table:
             Cell(_amount(finding.allowed, finding.unit), value=finding.allowed),
             finding.by or DASH,
             explanation(finding) or DASH,
+            *([_named(str(finding.standing or DASH), finding.change)] if compared else []),
         ]
         for finding in findings
     ]
-    return Table(["case", "verdict", "error", "allowed", "allowed by", "explanation"], body, check.capitalize())
+    header = ["case", "verdict", "error", "allowed", "allowed by", "explanation", *(["known errors"] if compared else [])]
+    return Table(header, body, check.capitalize())
 
 
 def _verdict(verdict: Verdict) -> Cell:
@@ -252,11 +303,22 @@ def _verdict(verdict: Verdict) -> Cell:
 
 
 def _check(subject: str, finding: Finding) -> Check:
-    """Return a finding as a test case. A case that is undecided or not tested is skipped, with the reason."""
+    """Return a finding as a test case.
+
+    A case that is undecided or not tested is skipped, and so is a known error, with the reason.
+    """
     why = explanation(finding)
     name = _named(finding.check, finding.case)
+    if finding.standing is Standing.NEW:
+        return Check(
+            subject, name, failure=finding.change if finding.verdict is Verdict.NOT_TESTED else _named(finding.change, why)
+        )
+    if finding.standing is not None and finding.verdict is not Verdict.RIGHT:
+        return Check(subject, name, skipped=_named(_named(str(finding.standing), finding.change), why))
     if finding.verdict is Verdict.WRONG:
         return Check(subject, name, failure=why or str(finding.verdict))
     if finding.verdict is Verdict.RIGHT:
-        return Check(subject, name, output=why)
+        return Check(
+            subject, name, output="; ".join(filter(None, (_named("better", finding.change) * bool(finding.change), why)))
+        )
     return Check(subject, name, skipped=_named(finding.verdict, why))

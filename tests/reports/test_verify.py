@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import sys
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import click
@@ -11,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 import conservative as cv
-from conservative.benchmarks.verification.finding import Cause, Finding, Verdict, Verification
+from conservative.benchmarks.verification.finding import Cause, Finding, MotionFinding, Verdict, Verification
 from conservative.benchmarks.verification.verify import expand
 from conservative.reports.cli.main import main
 from conservative.reports.cli.options import OLD_NAMES
@@ -22,15 +23,22 @@ RIGHT, WRONG, UNDECIDED, NOT_TESTED = Verdict
 GYROSCOPIC = Cause(("no gyroscopic term",), "The gyroscopic term is missing", 1e-9, 0.3, {"share": 1.0})
 WORLD = Cause(("world rates",), "Rates are in world axes", 2e-9, 0.3, remedy="answer in body axes")
 REASON = "the gyroscopic term is missing (explains 2 of 3 failing motions)"
+
+
+def motion(case, error, causes, verdict=WRONG, subject="b"):
+    both = {"errors": (error, error / 2), "tolerances": (0.1, 0.1)}
+    return MotionFinding(subject, "motions", case, verdict, error, 0.1, causes=causes, **both)
+
+
 MADE = {
-    "a": Verification("a", "engine", [Finding("a", "motions", "fast", RIGHT, 0.01, 0.1, by="order")], "1 of 1 motions"),
+    "a": Verification("a", "engine", [motion("fast", 0.01, (), RIGHT, "a")], "1 of 1 motions"),
     "b": Verification(
         "b",
         "program",
         [
-            Finding("b", "motions", "fast", WRONG, 0.3, 0.1, causes=(GYROSCOPIC,)),
-            Finding("b", "motions", "slow", WRONG, 0.2, 0.1, causes=(GYROSCOPIC,)),
-            Finding("b", "motions", "tiny", WRONG, 0.2, 0.1, causes=(GYROSCOPIC, WORLD)),
+            motion("fast", 0.3, (GYROSCOPIC,)),
+            motion("slow", 0.2, (GYROSCOPIC,)),
+            motion("tiny", 0.2, (GYROSCOPIC, WORLD)),
             Finding("b", "motions", "spring", NOT_TESTED, detail="it has no springs"),
             Finding("b", "times", "", UNDECIDED, detail="the clock is coarse"),
         ],
@@ -107,6 +115,97 @@ def test_all_formats_have_the_same_findings(verify, tmp_path):
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["verify.csv", "verify.json", "verify.md"]
     text = (tmp_path / "out" / "verify.md").read_text()
     assert all(f"| {case} |" in text for _, _, case, _ in expected if case)
+
+
+@pytest.fixture
+def recorded(monkeypatch, tmp_path):
+    """Return the command with subjects `a` to `d`, which compares them with the file `known.txt`, written before a change."""
+    module = sys.modules[cv.verification.verify.__module__]
+    made = dict(MADE)
+    monkeypatch.setattr(module, "expand", lambda texts: [module.Subject(text, module.Kind.PROGRAM) for text in texts])
+    monkeypatch.setattr(module, "_verify_all", lambda subjects, *_: [made[subject.text] for subject in subjects])
+
+    def command(*words, **changed):
+        made.update(changed)
+        return invoke("verify", *words)
+
+    return command
+
+
+def changed(*values):
+    """Return `b` with another finding on a motion."""
+    new = motion(*values)
+    return replace(MADE["b"], findings=[new if each.case == new.case else each for each in MADE["b"].findings])
+
+
+def test_the_first_run_with_known_errors_passes_and_so_does_a_later_one(recorded, tmp_path):
+    file = tmp_path / "known.txt"
+    assert [recorded(*"abd").exit_code, recorded(*"abd", "--record", file).exit_code] == [1, 0]
+    text = file.read_text(encoding="utf-8")
+    done = recorded(*"abd", "--known", file)
+    assert done.stderr == ""
+    assert (done.exit_code, file.read_text(encoding="utf-8")) == (0, text)
+    assert "b is wrong as recorded, with 3 known errors" in done.stdout
+    assert recorded(*"abd", "--record", file).exit_code == 0  # replaces its own file
+
+
+@pytest.mark.parametrize("how", ["option", "variable"])
+def test_a_new_failure_is_shown_in_all_formats(how, recorded, tmp_path, monkeypatch):
+    file, xml, table = tmp_path / "known.txt", tmp_path / "v.xml", tmp_path / "v.csv"
+    assert recorded("b", "--record", file).exit_code == 0
+    words = ("--known", file) if how == "option" else ()
+    if how == "variable":
+        monkeypatch.setenv("ROTATION_KNOWN", str(file))
+    worse = changed("slow", 0.9, (WORLD,))
+    done = recorded("b", *words, "--junit", xml, "--csv", table, "--markdown", tmp_path / "v.md", b=worse)
+    assert done.exit_code == 1
+    change = "attitude error 9.0e-01 rad, was 2.0e-01; rates error 4.5e-01, was 1.0e-01; world rates, was no gyroscopic term"
+    assert done.stdout.splitlines()[0].startswith("b is wrong, with 1 new failure and 2 known errors: ")
+    assert f"  new: motions: slow: {change}" in done.stdout.splitlines()
+    assert change in (tmp_path / "v.md").read_text(encoding="utf-8")
+    suite = ElementTree.parse(xml).getroot()[0]
+    assert (suite.get("failures"), suite.get("skipped")) == ("1", "4")
+    assert [each.get("message").startswith(change) for each in suite.iter("failure")] == [True]
+    assert sum(each.get("message").startswith("known: ") for each in suite.iter("skipped")) == 3
+    rows = {row["case"]: row for row in csv.DictReader(io.StringIO(table.read_text(encoding="utf-8")))}
+    assert {case: row["standing"] for case, row in rows.items()} == {
+        "fast": "known", "slow": "new", "tiny": "known", "spring": "", "": "known",
+    }  # fmt: skip
+    assert rows["slow"]["change"] == change
+    (subject,) = json.loads(recorded("b", *words, "--json").stdout)["subjects"]
+    assert [each["standing"] for each in subject["findings"]] == ["known", "new", "known", None, "known"]
+    assert (subject["compared"], subject["exit_code"]) == (True, 1)
+
+
+def test_the_sentence_for_a_pull_request_is_the_last_line(recorded, tmp_path):
+    file, worse = tmp_path / "known.txt", changed("tiny", 0.9, (GYROSCOPIC, WORLD))
+    recorded("b", "--record", file)
+    done = recorded("b", "--known", file, b=worse)
+    errors = "attitude error 0.3 to 0.9 rad"
+    sentence = f"free rotation at your step: {errors}; first bad motion: tiny (no gyroscopic term or world rates)"
+    assert done.stdout.splitlines()[-1] == sentence
+    (subject,) = json.loads(recorded("b", "--known", file, "--json").stdout)["subjects"]
+    assert subject["change"] == sentence
+    assert "free rotation" not in recorded("b", "--known", file, b=MADE["b"]).stdout
+
+
+def test_what_is_better_is_shown_and_passes(recorded, tmp_path):
+    file = tmp_path / "known.txt"
+    recorded("b", "--record", file)
+    done = recorded("b", "--known", file, "--junit", tmp_path / "v.xml", b=changed("slow", 0.01, (), RIGHT))
+    assert done.exit_code == 0
+    assert "  better: motions: slow: 2.0e-01 to 1.0e-02 rad: record again to tighten" in done.stdout.splitlines()
+    assert ElementTree.parse(tmp_path / "v.xml").getroot()[0].get("failures") == "0"
+
+
+def test_a_file_of_others_is_not_recorded_into(recorded, tmp_path):
+    file = tmp_path / "notes.txt"
+    file.write_text("my notes\n", encoding="utf-8")
+    for more in ((), ("--force",)):
+        assert recorded("b", "--record", file, *more).exit_code == 2
+        assert file.read_text(encoding="utf-8") == "my notes\n"
+    assert recorded("b", "--record", file, "--known", file).exit_code == 2
+    assert recorded("b", "--known", file).exit_code == 2
 
 
 UNUSED = {

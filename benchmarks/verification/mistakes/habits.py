@@ -74,6 +74,10 @@ class OtherRows(Mistake):
     kind: ClassVar[str] = "rows"
 
 
+LARGER = 1.01
+"""Factor by which a limit that one row shows cuts the rates: by more than the error of a step."""
+
+
 def limit(w: Array, most: float) -> Array:
     """Return rates whose norm is limited."""
     speed = np.linalg.norm(w, axis=-1, keepdims=True)
@@ -81,14 +85,15 @@ def limit(w: Array, most: float) -> Array:
 
 
 def _guess_limit(sizes: Array, before: Array) -> tuple[float, ...]:
-    """Return the largest size, if larger ones were cut to it in two or more rows.
+    """Return the largest size, if larger ones were cut to it in two or more rows, or much larger ones in the first row.
 
-    Few digits in a file do not hide the limit: sizes that equal the largest to a part in 1,000 at most count.
+    Few digits in a file do not hide the limit: sizes that equal the largest to a part in 1,000 at most count. After a start
+    above the limit, the sizes of a free body can fall, so that no other row shows it.
     """
     larger = before > sizes * (1 + 1e-9)  # by more than round-off
     for share in (1e-7, 1e-6, 1e-5, 1e-4, 1e-3):
         cut = larger & (np.abs(sizes - sizes.max()) <= share * sizes.max())
-        if cut.sum() >= 2:
+        if cut.sum() >= 2 or (cut[0] and before[0] > LARGER * sizes[0]):
             return (float(np.median(sizes[cut])),)
     return ()
 

@@ -92,6 +92,54 @@ def asleep(w, h):
     return ZERO if math.sqrt(dot(w, w)) < 0.05 else w
 
 
+class Sleeping(Program):
+    """A program that stops a body whose speed was below a threshold for a time, rad/s and s."""
+
+    key = "sleep"
+
+    def __init__(self, threshold, time, *design):
+        super().__init__(*design)
+        self.threshold, self.time = threshold, time
+
+    def setup(self, body, R0):
+        super().setup(body, R0)
+        self.below = 0.0
+
+    def step(self, t, y, h):
+        return y[: self.size] + ZERO if self.below >= self.time else super().step(t, y, h)
+
+    def after(self, y, h):
+        y = super().after(y, h)
+        w = y[self.size :]
+        self.below = self.below + h if math.sqrt(dot(w, w)) < self.threshold else 0.0
+        return y[: self.size] + ZERO if self.below >= self.time else y
+
+
+class SlowTurn(Program):
+    """A program that turns the attitude by less than a limit in a step, rad, and keeps the rates."""
+
+    key = "rate limit"
+
+    def step(self, t, y, h):
+        w = y[self.size :]
+        most = math.pi / 4 / max(h * math.sqrt(dot(w, w)), 1e-300)
+        after = super().step(t, y, h)
+        return after if most >= 1 else self.turned(y[: self.size], [h * most * x for x in w]) + after[self.size :]
+
+
+class AsInstalled(Sleeping):
+    """Three habits that engines of games have at once."""
+
+    key = "no gyroscopic term + damping"
+
+    def gyroscopic(self, M, w):
+        return ZERO
+
+    def after(self, y, h):
+        y = super().after(y, h)
+        return y[: self.size] + [x * (1 - 0.05 * h) for x in y[self.size :]]
+
+
 class Answering(Program):
     """A program that reports other numbers than it has."""
 
@@ -192,5 +240,45 @@ def wrong_programs():
     return made
 
 
+def limited_to(most, of=lambda w, h: math.sqrt(dot(w, w))):
+    """Return the change of rates whose size, by default rad/s, is limited."""
+    return lambda w, h: [x * min(1.0, most / max(of(w, h), 1e-300)) for x in w]
+
+
+def of_turn(w, h):
+    return h * math.sqrt(dot(w, w))
+
+
+def habits():
+    """Return programs with limits, sleep, dead bands and cut-offs of small bodies, which fast, slow and small bodies show."""
+    rk2, euler = ("midpoint",), ("semi-implicit Euler",)
+    made = {}
+    for name, design in (("rk2", rk2), ("euler", euler)):
+        for most in (7, 47, 100, 500):
+            made[f"limit {most} {name}"] = Changed("rate limit", limited_to(most), *design)
+        made[f"limit of a component {name}"] = Changed(
+            "rate limit per component", lambda w, h: [max(-100.0, min(100.0, x)) for x in w], *design
+        )
+        made[f"turn {name}"] = Changed("rate limit", limited_to(math.pi / 4, of_turn), *design)
+        made[f"turn of the attitude {name}"] = SlowTurn(*design)
+        for threshold in (0.001, 0.05, 0.8):
+            made[f"sleep {threshold:g} {name}"] = Sleeping(threshold, 0.5, *design)
+        made[f"late sleep {name}"] = Sleeping(0.05, 2.0, *design)
+        for band in (1e-5, 1e-3, 0.1):
+            made[f"band {band:g} {name}"] = Changed(
+                "dead band", lambda w, h, band=band: [x if abs(x) >= band else 0.0 for x in w], *design
+            )
+        made[f"smallest moments {name}"] = OtherBody(
+            "smallest moments", lambda body: {"J": diagonal([max(body.J[i][i], 1e-6) for i in range(3)])}, *design
+        )
+        made[f"small inertia {name}"] = OtherBody(
+            "smallest moments",  # a ball in both cases
+            lambda body: {"J": diagonal([1.0] * 3)} if math.hypot(*(body.J[i][i] for i in range(3))) < 1e-6 else {},
+            *design,
+        )
+        made[f"as installed {name}"] = AsInstalled(0.05, 0.5, *design)
+    return made
+
+
 if __name__ == "__main__":
-    serve(wrong_programs()[sys.argv[1]], sys.argv[1])
+    serve((wrong_programs() | habits())[sys.argv[1]], sys.argv[1])
