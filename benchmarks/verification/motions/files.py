@@ -16,7 +16,7 @@ from conservative.files import make_folder, write_text
 
 from . import search
 from .motion import GRAVITY, KINDS, SAMPLE, Motion, load
-from .programs import ANGLES, PARTS, QUANTITIES, Measured, error, measure, single, sizes
+from .programs import ANGLES, PARTS, QUANTITIES, Measured, error, measure, sizes
 from .signatures import Samples, signatures
 
 FACTOR = 2.0
@@ -47,7 +47,7 @@ def describe(motion: Motion, measured: Measured, signature: dict[str, Samples]) 
             {"order": order, "angle": angle, "steps": motion.steps * PARTS[at % 3], **_named(values)}
             for at, ((order, angle), values) in enumerate(measured.tolerances.items())
         ],
-        "single": _short(single(motion)),
+        "single": _short(measured.single),
         "catches": catches(motion, measured.tolerances[2, ANGLES[-1]], signature),
     }
 
@@ -128,15 +128,15 @@ def read(name: str) -> dict[str, Any]:
     return json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
 
 
-def tolerance(motion: Motion, order: int | None, in_single: bool = False) -> tuple[float, float]:
+def tolerance(motion: Motion, order: int | None, single: bool = False) -> tuple[float, float]:
     """Return the largest allowed errors of a program of an order at |w| h = 0.01: of the attitude, rad, and relative, of rates.
 
     Order 3 and a program that chooses its steps (None) have the tolerances of order 2. Published motions have those of their
     files, and fresh ones those that are measured with the same motion in the axes of the seed.
     """
     order = tested_order(order)
-    attitude, rates, more = _published(motion.name, order) if motion.seed is None else _limits(motion.seed, order)[motion.name]
-    return (attitude + more, rates + more) if in_single else (attitude, rates)
+    attitude, rates, more = _published(motion.name, order) if motion.seed is None else _limits(motion.seed)[motion.name, order]
+    return (attitude + more, rates + more) if single else (attitude, rates)
 
 
 def _published(name: str, order: int) -> tuple[float, float, float]:
@@ -146,12 +146,13 @@ def _published(name: str, order: int) -> tuple[float, float, float]:
 
 
 @cache
-def _limits(seed: int, order: int) -> dict[str, tuple[float, float, float]]:
-    """Return the tolerances of attitude and rates, and what single precision may add, by the names of the motions of a seed."""
-    motions, limits = search.fresh(seed), dict[str, tuple[float, float, float]]()
-    for motion, measured in zip(motions, measure(motions, PARTS[-1:], (order,)), strict=True):
-        attitude, rates = map(_short, measured.tolerances[order, ANGLES[-1]][:2])
-        limits[motion.name] = attitude, rates, _short(single(motion))
+def _limits(seed: int) -> dict[tuple[str, int], tuple[float, float, float]]:
+    """Return the tolerances of attitude and rates, and what single precision may add, by motion of a seed and order."""
+    motions, limits = search.fresh(seed), dict[tuple[str, int], tuple[float, float, float]]()
+    for motion, measured in zip(motions, measure(motions, PARTS[-1:]), strict=True):
+        for (order, _), tolerances in measured.tolerances.items():
+            attitude, rates = map(_short, tolerances[:2])
+            limits[motion.name, order] = attitude, rates, _short(measured.single)
     return limits
 
 
