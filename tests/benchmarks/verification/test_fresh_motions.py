@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -138,11 +139,11 @@ def test_wrong_programs_are_named(few, name, seed):
 
     def solve(scene, grid):
         (motion,) = (motion for motion in search.fresh(seed) if motion.name == scene.name)
-        steps = np.arange(grid.sample_every, grid.n_steps + 1, grid.sample_every)
+        steps = np.arange(0, grid.n_steps + 1, grid.every)
         keys = fresh_motions.keys_of(motion)
-        states = program.states(of_motion(keys), keys["quaternion_wxyz0"], keys["w_WB_B0"], grid.dt, [0, *steps.tolist()])
-        R = np.array([matrix(q) for q, _ in states])
-        return verified_programs.Trajectory(grid.t, R, np.array([w for _, w in states], dtype=float), {})
+        states = program.states(of_motion(keys), keys["quaternion_wxyz0"], keys["w_WB_B0"], grid.dt, steps.tolist())
+        R, w = np.array([matrix(q) for q, _ in states]), np.array([w for _, w in states], dtype=float)
+        return SimpleNamespace(t=grid.dt * steps, R_WB=R, w_WB_B=w, failure=None)
 
     answers = verified_programs.run_motions(solve, program.order, seed=seed)
     _, named, _ = verified_programs.motion_findings("program", answers)
