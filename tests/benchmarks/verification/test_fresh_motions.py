@@ -12,12 +12,13 @@ from click.testing import CliRunner
 from conservative.attitude import angle_between
 from conservative.benchmarks.verification import programs as verified_programs
 from conservative.benchmarks.verification.finding import Verdict
-from conservative.benchmarks.verification.motions import files, programs, search
+from conservative.benchmarks.verification.motions import files, one_file, programs, search
 from conservative.benchmarks.verification.motions.integrators import designs
 from conservative.benchmarks.verification.motions.motion import load
 from conservative.benchmarks.verification.verify import verify
 from conservative.errors import BadInput, IntegrationFailed
 from conservative.references import precise
+from conservative.reports.cli import motions as motions_module
 from conservative.reports.cli.main import main
 
 from ...attack import fresh_motions
@@ -208,6 +209,10 @@ def test_the_command_replaces_no_files_of_another_seed(other, few, tmp_path, mon
 def test_the_command_refuses_bad_seeds(seed, tmp_path):
     done = CliRunner().invoke(main, ["motions", "--seed", seed, "--out", str(tmp_path)])
     assert (done.exit_code, "--seed" in done.output) == (2, True)
+
+
+def test_languages_of_the_command_are_those_of_the_tests():
+    assert set(motions_module.LANGUAGES) == set(one_file.LANGUAGES)
 
 
 def test_a_test_with_fresh_motions_is_one_file(few, tmp_path):

@@ -167,7 +167,7 @@ def test_signatures_are_computed_again(name):
 
 @slow
 def test_the_command_writes_the_files_again(tmp_path):
-    """It solves all motions and measures all tolerances. Two things in the files are of earlier code, and nothing depends on them.
+    """It solves all motions and measures all tolerances. Two things in the files are of earlier code; nothing depends on them.
 
     Noise of 1e-60 in `brick_flip` is of another arithmetic, and the error of `golden_1` with an inverted inertia, 600 times its
     rates, of a solver of equations with other round-off.
