@@ -16,7 +16,6 @@ from __future__ import annotations
 import argparse
 import ctypes
 import json
-import re
 import shutil
 import subprocess
 import tempfile
@@ -211,12 +210,6 @@ def tables(rows: Sequence[Row]) -> str:
         "",
     ]
     return "\n".join(text)
-
-
-def read_page(text: str) -> int:
-    """Return the number of seeds of the page."""
-    found = re.search(r"([\d,]+) seeds,", text.partition(BEGIN)[2].partition(END)[0])
-    return int(found[1].replace(",", "")) if found else 0
 
 
 def main() -> None:

@@ -197,9 +197,11 @@ def test_the_command_writes_the_files_of_a_seed(few, tmp_path):
 
 
 @pytest.mark.parametrize("other", [["--seed", str(OTHER)], []])
-def test_the_command_replaces_no_files_of_another_seed(other, few, tmp_path, monkeypatch):
+@pytest.mark.parametrize("kind", ["json", "csv"])
+def test_the_command_replaces_no_files_of_another_seed(kind, other, few, tmp_path, monkeypatch):
     for name, mark in files.marks(SEED):
-        (tmp_path / name).write_text("{\n" * name.endswith("json") + mark)
+        if name.endswith(kind):
+            (tmp_path / name).write_text("{\n" * (kind == "json") + mark)
     monkeypatch.setattr(files, "write", lambda *_: pytest.fail("written"))
     done = CliRunner().invoke(main, ["motions", *other, "--out", str(tmp_path)])
     assert (done.exit_code, "--force" in done.output) == (2, True)
