@@ -39,7 +39,7 @@ from .explain import PROGRAM_KINDS, diagnose
 from .explanation import HALF, OWN_ERROR, Explanation
 from .finding import Cause, Finding, MotionFinding, Settings, Verdict, Verification, uncapitalised
 from .mistakes import BY_KEY
-from .motions.files import tolerance
+from .motions.files import of_seed, tolerance
 from .motions.motion import Motion, load
 from .motions.programs import ANGLES, ORDERS, PARTS
 
@@ -178,13 +178,14 @@ def run_motions(
     principal: bool = False,
     unsupported: Callable[[Scene], str | None] = lambda scene: None,
     tell: Callable[[str], object] = lambda what: None,
+    seed: int | None = None,
 ) -> Answers:
-    """Run the exact motions, in principal axes of their bodies for a subject that gets no others.
+    """Run the published motions, or those of a seed, in principal axes of their bodies for a subject that gets no others.
 
     `unsupported` returns why a scene is not supported, None if it is.
     """
     ran, reasons = list[Ran](), dict[str, str]()
-    for original in load():
+    for original in load() if seed is None else of_seed(seed):
         tell(original.name)
         motion = in_principal_axes(original) if principal else original
         allowed = np.array(tolerance(motion, order, single))
@@ -490,10 +491,11 @@ def verify_method(
     pairs: Sequence[str] = (),
     tell: Callable[[float, str], object] = lambda share, what: None,
     subject: str = "",
+    seed: int | None = None,
 ) -> Verification:
     """Verify a method or an engine by the exact motions, its order, repeatability, and pairs of descriptions.
 
-    `pairs` are names of pairs, by default all.
+    `pairs` are names of pairs, by default all. The motions are the published ones, or those of a seed.
     """
     subject = subject or method.name
     single = bits_of(method) == 32
@@ -501,7 +503,13 @@ def verify_method(
     if {"motions", "order", "repeatability"} & set(checks):
         principal = isinstance(method, AdapterMethod)
         answers = run_motions(
-            solver(method), method.order, single, principal, method.unsupported, lambda what: tell(0.0, f"{subject}: {what}")
+            solver(method),
+            method.order,
+            single,
+            principal,
+            method.unsupported,
+            lambda what: tell(0.0, f"{subject}: {what}"),
+            seed,
         )
         if "motions" in checks:
             some, named, order = motion_findings(subject, answers)
@@ -563,6 +571,7 @@ def verify_program(
     pairs: Sequence[str] = (),
     tell: Callable[[float, str], object] = lambda share, what: None,
     method: EngineMethod | None = None,
+    seed: int | None = None,
 ) -> Verification:
     """Verify a program by PROTOCOL.md, and as `verify_method`. A program that does not answer is wrong.
 
@@ -581,7 +590,7 @@ def verify_program(
             if "times" in checks:
                 findings += protocol.times(subject, method)
             rest = [check for check in checks if check not in ("protocol", "times")]
-            verification = verify_method(method, "program", rest, pairs, tell, subject)
+            verification = verify_method(method, "program", rest, pairs, tell, subject, seed)
     except (UnusableProgram, IntegrationFailed) as failure:
         findings.append(protocol.unusable(subject, failure))
         return Verification(subject, "program", findings, findings[-1].detail)

@@ -48,6 +48,8 @@ CHECKS_OF: dict[Kind, tuple[str, ...]] = {
     Kind.MODEL: ("bodies",),
 }
 """Checks of each kind of subject, in their order."""
+MOTION_CHECKS = ("motions", "order", "repeatability")
+"""Checks that run exact motions."""
 MODELS = (".urdf", ".sdf", ".mjcf", ".xml", ".usd", ".usda", ".usdc", ".usdz")
 """Suffixes of model files."""
 
@@ -124,6 +126,7 @@ def verify(
     start: str = "row",
     error: float | None = None,
     rates: str | None = None,
+    seed: int | None = None,
     record: str | os.PathLike[str] | None = None,
     known: str | os.PathLike[str] | None = None,
     tell: Tell = lambda share, what: None,
@@ -149,6 +152,8 @@ def verify(
     start, error, rates, **reading
         For recordings: "row" or "scene", the allowed error, "body" or "world" for the axes of rates, and the other options of
         `recordings.table.Options`.
+    seed
+        For methods, engines and programs: the fresh motions of this seed instead of the published ones.
     record
         File of known errors to write (`known`): all errors of this run are known. A file of another kind is not replaced.
     known
@@ -190,14 +195,17 @@ def verify(
         choice("only", name, tuple(CHECKS))
     kinds = {subject.kind for subject in expanded} | ({Kind.METHOD} if methods else set())
     begin = None if start == "row" else start
-    _refuse_unused(kinds, body=body, engines=engines, search=search, pairs=pairs, start=begin, error=error, **reading)
+    _refuse_unused(
+        kinds, body=body, engines=engines, search=search, pairs=pairs, start=begin, error=error, seed=seed, **reading
+    )
     if unused := set(only) - {check for kind in kinds for check in CHECKS_OF[kind]}:
         allowed = ", ".join(dict.fromkeys(check for kind in kinds for check in CHECKS_OF[kind]))
         raise BadInput("only", repr(sorted(unused)[0]), f"checks of {' and '.join(sorted(kinds))}: {allowed}")
     if pairs and only and "pairs" not in only:
         raise BadInput("pairs", f"{', '.join(pairs)!r} without the check of pairs", "pairs in --only, or no --only")
+    _require_motions(seed, only, record or known)
     with _known_errors(record, known, only, bool(pairs)) as compare:
-        return compare(_verify_all(expanded, methods, body, engines, only, pairs, search, start, error, tell, reading))
+        return compare(_verify_all(expanded, methods, body, engines, only, pairs, search, start, error, seed, tell, reading))
 
 
 @contextmanager
@@ -236,6 +244,7 @@ def _verify_all(
     search: Sequence[Path],
     start: str,
     error: float | None,
+    seed: int | None,
     tell: Tell,
     reading: Mapping[str, Any],
 ) -> list[Verification]:
@@ -250,21 +259,40 @@ def _verify_all(
         results += _verify_recordings(tables, together, body, start, error, tell, reading)
     for subject in expanded:
         if subject.kind is Kind.PROGRAM:
-            results += _verify_program(subject.text, only, pairs, tell)
+            results += _verify_program(subject.text, only, pairs, tell, seed)
         elif subject.kind in (Kind.ENGINE, Kind.METHOD):
             from ..studies.selection import methods as select  # here: recordings need no kernels
 
-            results += [_verify_method(method, subject.kind, only, pairs, tell) for method in select([subject.text])]
-    return results + [_verify_method(method, Kind.METHOD, only, pairs, tell) for method in methods]
+            results += [_verify_method(method, subject.kind, only, pairs, tell, seed) for method in select([subject.text])]
+    return results + [_verify_method(method, Kind.METHOD, only, pairs, tell, seed) for method in methods]
 
 
-def _verify_method(method: Method, kind: Kind, only: Sequence[str], pairs: Sequence[str], tell: Tell) -> Verification:
+def _require_motions(seed: int | None, only: Sequence[str], known: str | os.PathLike[str] | None) -> None:
+    """Raise `BadInput` for a seed that is not one, that no check uses, or that is given with a file of known errors."""
+    if seed is None:
+        return
+    if only and not set(only) & set(MOTION_CHECKS):
+        raise BadInput("seed", f"{seed!r} without a check by motions", f"{', '.join(MOTION_CHECKS)} in --only, or no --only")
+    if known is not None:
+        raise BadInput("seed", f"{seed!r} and known errors, which are of the published motions", "one of them")
+    from .motions.search import require_seed  # here: recordings need no kernels
+
+    require_seed(seed)
+
+
+def _verify_method(
+    method: Method, kind: Kind, only: Sequence[str], pairs: Sequence[str], tell: Tell, seed: int | None
+) -> Verification:
     from .programs import verify_method
 
-    return verify_method(method, kind, [check for check in CHECKS_OF[kind] if not only or check in only], pairs, tell)
+    return verify_method(
+        method, kind, [check for check in CHECKS_OF[kind] if not only or check in only], pairs, tell, seed=seed
+    )
 
 
-def _verify_program(text: str, only: Sequence[str], pairs: Sequence[str], tell: Tell) -> Iterator[Verification]:
+def _verify_program(
+    text: str, only: Sequence[str], pairs: Sequence[str], tell: Tell, seed: int | None
+) -> Iterator[Verification]:
     """Yield the verification of a program with each of its settings; the protocol and the times are verified once."""
     from conservative.references.environments.programs import UnusableProgram, find_program, read_program
 
@@ -274,18 +302,18 @@ def _verify_program(text: str, only: Sequence[str], pairs: Sequence[str], tell: 
     checks = [check for check in CHECKS_OF[Kind.PROGRAM] if not only or check in only]
     program = find_program(text.partition(":")[0])
     if program is None:  # the command line of a program that is not registered
-        yield verify_program(text, read_program(text, "program"), checks, pairs, tell)
+        yield verify_program(text, read_program(text, "program"), checks, pairs, tell, seed=seed)
         return
     try:
         first, *others = list[Any](select([text]))
     except UnusableProgram:  # it becomes a finding
-        yield verify_program(text, program, checks, pairs, tell)
+        yield verify_program(text, program, checks, pairs, tell, seed=seed)
         return
     rest = [check for check in CHECKS_OF[Kind.METHOD] if check in checks]
     others = others if rest else []
-    yield verify_program(first.name if others else text, program, checks, pairs, tell, first)
+    yield verify_program(first.name if others else text, program, checks, pairs, tell, first, seed)
     for method in others:
-        yield _verify_method(method, Kind.PROGRAM, rest, pairs, tell)
+        yield _verify_method(method, Kind.PROGRAM, rest, pairs, tell, seed)
 
 
 def _verify_recordings(
@@ -321,6 +349,7 @@ USED_BY: dict[str, tuple[Kind, ...]] = {
     "engines": (Kind.MODEL,),
     "search": (Kind.MODEL,),
     "pairs": (Kind.METHOD, Kind.ENGINE, Kind.PROGRAM),
+    "seed": (Kind.METHOD, Kind.ENGINE, Kind.PROGRAM),
 }
 """Kinds of subjects that use an option; all others are of recordings."""
 

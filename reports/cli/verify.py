@@ -63,6 +63,7 @@ LISTS = ("only", "pairs", "engines")
         "conservative verify a.csv b.csv --body my_body.toml             they disagree: which one is wrong?",
         "conservative verify ./my_engine 'python my_engine.py'           programs",
         "conservative verify mujoco@3.12.0 drake:discrete                engines",
+        "conservative verify ./my_engine --seed 7                        by motions that nobody has seen",
         "conservative verify ./my_engine --record known.txt              its errors are known, later ones fail:",
         "conservative verify ./my_engine --known known.txt",
         "conservative verify my_robot.urdf --engines mujoco,drake        do they load the body that the file describes?",
@@ -111,6 +112,12 @@ LISTS = ("only", "pairs", "engines")
     "CHECKS",
 )
 @names_option("pairs", "Engines and programs: pairs of descriptions to compare.  [default: all]")
+@click.option(
+    "--seed",
+    type=click.IntRange(0),
+    metavar="N",
+    help="Methods, engines and programs: the fresh motions of this seed instead of the published ones.",
+)
 @click.option("--scripts", type=FilePath(), help="Folder for a script of each pair that differs, in the engine's own language.")
 @names_option(
     "engines",

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,9 @@ import conservative
 from conservative.attitude import Array
 from conservative.files import make_folder, write_text
 
+from . import search
 from .motion import GRAVITY, KINDS, SAMPLE, Motion, load
-from .programs import ANGLES, PARTS, QUANTITIES, Measured, error, measure, single, sizes
+from .programs import ANGLES, PARTS, QUANTITIES, Measured, error, measure, sizes
 from .signatures import Samples, signatures
 
 FACTOR = 2.0
@@ -29,6 +31,7 @@ def describe(motion: Motion, measured: Measured, signature: dict[str, Samples]) 
     parts = {key: getattr(motion, key) for key in (*KINDS, "com_B") if getattr(motion, key) is not None}
     return {
         "name": motion.name,
+        **({} if motion.seed is None else {"seed": motion.seed}),
         "about": motion.about,
         "features": motion.features,
         "inertia_B": motion.inertia_B,
@@ -44,7 +47,7 @@ def describe(motion: Motion, measured: Measured, signature: dict[str, Samples]) 
             {"order": order, "angle": angle, "steps": motion.steps * PARTS[at % 3], **_named(values)}
             for at, ((order, angle), values) in enumerate(measured.tolerances.items())
         ],
-        "single": _short(single(motion)),
+        "single": _short(measured.single),
         "catches": catches(motion, measured.tolerances[2, ANGLES[-1]], signature),
     }
 
@@ -100,13 +103,23 @@ def as_json(keys: dict[str, Any]) -> str:
     return "{\n" + ",\n".join(texts) + "\n}\n"
 
 
-def contents() -> Iterator[tuple[str, str]]:
-    """Yield the names and texts of the files of all motions."""
-    motions = load()
+def of_seed(seed: int | None) -> Sequence[Motion]:
+    """Return the published motions (None), or the fresh motions of a seed. Raise `BadInput` for another seed."""
+    return load() if seed is None else search.fresh(seed)
+
+
+def descriptions(seed: int | None = None) -> Iterator[dict[str, Any]]:
+    """Yield the published motions, or those of a seed, as the keys and values of their JSON files, solved and measured."""
+    motions = of_seed(seed)
     for motion, measured, signature in zip(motions, measure(motions), signatures(motions), strict=True):
-        keys = describe(motion, measured, signature)
-        yield f"{motion.name}.json", as_json(keys)
-        yield f"{motion.name}.csv", as_csv(keys)
+        yield describe(motion, measured, signature)
+
+
+def contents(seed: int | None = None) -> Iterator[tuple[str, str]]:
+    """Yield the names and texts of the files of all motions."""
+    for keys in descriptions(seed):
+        yield f"{keys['name']}.json", as_json(keys)
+        yield f"{keys['name']}.csv", as_csv(keys)
 
 
 def read(name: str) -> dict[str, Any]:
@@ -118,12 +131,29 @@ def read(name: str) -> dict[str, Any]:
 def tolerance(motion: Motion, order: int | None, single: bool = False) -> tuple[float, float]:
     """Return the largest allowed errors of a program of an order at |w| h = 0.01: of the attitude, rad, and relative, of rates.
 
-    Order 3 and a program that chooses its steps (None) have the tolerances of order 2.
+    Order 3 and a program that chooses its steps (None) have the tolerances of order 2. Published motions have those of their
+    files, and fresh ones those that are measured with the same motion in the axes of the seed.
     """
-    kept = read(motion.name)
-    (row,) = (row for row in kept["tolerance"] if (row["order"], row["angle"]) == (tested_order(order), ANGLES[-1]))
-    more = kept["single"] if single else 0.0
-    return row["attitude"] + more, row["rates"] + more
+    order = tested_order(order)
+    attitude, rates, more = _published(motion.name, order) if motion.seed is None else _limits(motion.seed)[motion.name, order]
+    return (attitude + more, rates + more) if single else (attitude, rates)
+
+
+def _published(name: str, order: int) -> tuple[float, float, float]:
+    kept = read(name)
+    (row,) = (row for row in kept["tolerance"] if (row["order"], row["angle"]) == (order, ANGLES[-1]))
+    return row["attitude"], row["rates"], kept["single"]
+
+
+@cache
+def _limits(seed: int) -> dict[tuple[str, int], tuple[float, float, float]]:
+    """Return the tolerances of attitude and rates, and what single precision may add, by motion of a seed and order."""
+    motions, limits = search.fresh(seed), dict[tuple[str, int], tuple[float, float, float]]()
+    for motion, measured in zip(motions, measure(motions, PARTS[-1:]), strict=True):
+        for (order, _), tolerances in measured.tolerances.items():
+            attitude, rates = map(_short, tolerances[:2])
+            limits[motion.name, order] = attitude, rates, _short(measured.single)
+    return limits
 
 
 def tested_order(order: int | None) -> int:
@@ -131,17 +161,22 @@ def tested_order(order: int | None) -> int:
     return {1: 1, 2: 2, 3: 2, None: 2}.get(order, 4)
 
 
-def marks() -> Iterator[tuple[str, str]]:
-    """Yield the names of all files, and a text in the beginning of each."""
-    for motion in load():
-        yield f"{motion.name}.json", f'"name": "{motion.name}"'
-        yield f"{motion.name}.csv", f"key,values\nname,{motion.name}\n"
+def marks(seed: int | None = None) -> Iterator[tuple[str, str]]:
+    """Yield the names of all files, and a text in the beginning of each, which files of another seed do not have."""
+    names, json_key, row = (
+        ([motion.name for motion in load()], '"about"', "about")
+        if seed is None
+        else (list(search.FAMILIES), f'"seed": {seed},\n', f"seed,{seed}\n")
+    )
+    for name in names:
+        yield f"{name}.json", f'"name": "{name}",\n{json_key}'
+        yield f"{name}.csv", f"key,values\nname,{name}\n{row}"
 
 
-def write(folder: Path) -> list[str]:
+def write(folder: Path, seed: int | None = None) -> list[str]:
     """Write the files into a folder and return their names. Raise `NotWritten` if that is not possible."""
     make_folder(folder, "out")
-    texts = dict(contents())
+    texts = dict(contents(seed))
     for name, text in texts.items():
         write_text(folder / name, text, "out")
     return list(texts)

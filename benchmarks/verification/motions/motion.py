@@ -1,12 +1,14 @@
-"""The motions of `catalogue.toml`, and their solutions in multi-precision."""
+"""The motions of `catalogue.toml`, and their solutions in integer arithmetic."""
 
 from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
+from operator import mul
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +19,13 @@ from conservative.body import RigidBody
 from conservative.potentials.load import Damping, Torque
 from conservative.potentials.turning import Orbit
 from conservative.potentials.uniform_gravity import UniformGravity
-from conservative.references.exact.digits import MP_LOCK, mp
 from conservative.scene import Scene
 
 GRAVITY = 9.81
 """Acceleration, m/s^2, with which a weight is a mass."""
 TERMS, BITS, ANGLE = 60, 200, 0.2
 """The exact motion: terms of its Taylor series, bits of its numbers, and length of its steps, rad."""
+ONE = 2**BITS
 KINDS = {"rotor_momentum_B": "rotor", "torque_B": "torque", "torque_W": "torque", "damping": "damping",
          "weight": "fixed point", "orbit": "orbit"}  # fmt: skip
 """The feature of a motion by its key; a motion without any of them is free."""
@@ -34,6 +36,7 @@ class Motion:
     """A motion of the catalogue, in SI units: `step` is the time in which it turns by about 0.1 rad.
 
     There are `samples` samples after the start, each after `steps` of these steps. `inertia` has xx, yy, zz, xy, xz and yz.
+    `seed` is the seed of a fresh motion (see `search`), None for a published one.
     """
 
     name: str
@@ -51,6 +54,7 @@ class Motion:
     weight: float | None = None
     com_B: Sequence[float] | None = None
     orbit: float | None = None
+    seed: int | None = None
 
     @property
     def features(self) -> list[str]:
@@ -87,8 +91,7 @@ class Motion:
     @cached_property
     def exact(self) -> dict[str, Array]:
         """The solution at t = 0 and at the samples, arrays (n, ...) by the names in `SAMPLE`, each number rounded once."""
-        with MP_LOCK, mp.workprec(BITS):
-            return _solve(self)
+        return _solve(self)
 
 
 SAMPLE = ("R_WB", "quaternion_wxyz", "w_WB_B", "w_WB_W", "energy", "momentum_W")
@@ -101,7 +104,45 @@ def load() -> list[Motion]:
     return [Motion(name, **keys) for name, keys in tomllib.loads(text).items()]
 
 
-def _matrix(q: Sequence[Any], product: Any = lambda a, b: a * b) -> list[list[Any]]:
+class _Scaled:
+    """The numbers of a motion in units of its longest step and its largest moment, as integers: multiples of 2^-`BITS`.
+
+    Sums of products are rounded once, so that the solution has the same bits on every machine.
+    """
+
+    def __init__(self, motion: Motion) -> None:
+        self.step, self.size = 2 * Fraction(motion.step), max(Fraction(x) for x in motion.inertia[:3])
+        none, torque = (0.0, 0.0, 0.0), self.step**2 / self.size
+        J = [[Fraction(x) / self.size for x in row] for row in motion.inertia_B]
+        self.J, self.inverse = _whole(J), _whole(_inverse(J))
+        self.rates = _whole([Fraction(x) * self.step for x in motion.rates])
+        self.rotor = _whole([Fraction(x) * self.step / self.size for x in motion.rotor_momentum_B or none])
+        self.body, self.world = (
+            _whole([Fraction(x) * torque for x in load or none]) for load in (motion.torque_B, motion.torque_W)
+        )
+        self.damping = _whole([[Fraction(x) * self.step / self.size for x in row] for row in motion.damping or (none,) * 3])
+        self.arm = _whole([Fraction(motion.weight or 0) * Fraction(x) * torque for x in motion.com_B or none])
+        self.orbit = _whole(Fraction(motion.orbit or 0) * self.step)
+        q = [Fraction(x) for x in motion.quaternion]
+        square = sum(x * x for x in q)
+        norm = Fraction(math.isqrt(round(square * ONE**4)), ONE**2)
+        self.quaternion = _whole([x / norm for x in q])
+
+
+def _whole(x: Any) -> Any:
+    """Return numbers as multiples of 2^-`BITS`."""
+    return [_whole(part) for part in x] if isinstance(x, list) else round(x * ONE)
+
+
+def _inverse(J: list[list[Fraction]]) -> list[list[Fraction]]:
+    (a, b, c), (_, d, e), (_, _, f) = J
+    rows = [[d * f - e * e, c * e - b * f, b * e - c * d], [c * e - b * f, a * f - c * c, b * c - a * e]]
+    rows.append([rows[0][2], rows[1][2], a * d - b * b])
+    determinant = a * rows[0][0] + b * rows[0][1] + c * rows[0][2]
+    return [[x / determinant for x in row] for row in rows]
+
+
+def _matrix(q: Sequence[Any], product: Callable[[Any, Any], int]) -> list[list[int]]:
     """Return the matrix of a quaternion of norm 1, or a coefficient of its series with the product of series."""
     w, x, y, z = q
     ww, xx, yy, zz = (product(a, a) for a in q)
@@ -111,80 +152,88 @@ def _matrix(q: Sequence[Any], product: Any = lambda a, b: a * b) -> list[list[An
             [2 * (xz - wy), 2 * (yz + wx), ww - xx - yy + zz]]  # fmt: skip
 
 
-def _apply(M: Any, v: Any) -> list[Any]:
-    return [mp.fdot(row, v) for row in M]
+def _dot(a: Iterable[int], b: Iterable[int]) -> int:
+    return sum(map(mul, a, b)) >> BITS
 
 
-def _convolve(a: list[Any], b: list[Any]) -> Any:
+def _apply(M: Sequence[Sequence[int]], v: Sequence[int]) -> list[int]:
+    return [_dot(row, v) for row in M]
+
+
+def _convolve(a: list[int], b: list[int]) -> int:
     """Return the newest coefficient of the product of two series."""
-    return mp.fdot(a, reversed(b))
+    return sum(map(mul, a, reversed(b))) >> BITS
 
 
-def _cross(a: Any, b: Any) -> list[Any]:
+def _cross(a: Sequence[list[int]], b: Sequence[list[int]]) -> list[int]:
     """Return the newest coefficients of a x b, of vectors of series."""
     return [_convolve(a[i - 2], b[i - 1]) - _convolve(a[i - 1], b[i - 2]) for i in range(3)]
 
 
-def _advance(motion: Motion, inverse: Any, t: Any, state: list[Any], h: Any) -> list[Any]:
-    """Return the quaternion and the rates after a step, by their Taylor series.
+def _advance(f: _Scaled, state: list[int], h: int) -> list[int]:
+    """Return the quaternion, the rates and the direction of the planet after a step, by their Taylor series.
 
     q' = q w / 2 and J w' = (J w + h) x w + R' T_W + T_B - D w + g x m + 3 n^2 u x J u, with the vertical g, the moment m of the
-    weight, and the direction u of the planet in an orbit of rate n, in body axes.
+    weight, and the direction u = R' (cos n t, sin n t, 0) of the planet in an orbit of rate n, in body axes.
     """
-    J, y = motion.inertia_B, [[x] for x in state]
-    q, w, none = y[:4], y[4:], [mp.mpf(0)] * 3
-    L, u, Ju, R0, R1, R2 = (list[list[Any]](([], [], [])) for _ in range(6))
-    R = R0, R1, R2
-    moment, n = [mp.mpf(motion.weight or 0) * mp.mpf(x) for x in motion.com_B or none], mp.mpf(motion.orbit or 0)
-    orbit: tuple[list[Any], list[Any]] = [], []
+    y = [[x] for x in state]
+    q, w, planet = y[:4], y[4:7], y[7:]
+    L, u, Ju, *R = (list[list[int]](([], [], [])) for _ in range(6))
+    square = 3 * f.orbit * f.orbit >> BITS
     for k in range(TERMS):
         now = [series[k] for series in w]
-        _append(L, _apply(J, now), motion.rotor_momentum_B if motion.rotor_momentum_B and k == 0 else none)
+        _append(L, [a + (b if k == 0 else 0) for a, b in zip(_apply(f.J, now), f.rotor, strict=True)])
         for row, new in zip(R, _matrix(q, _convolve), strict=True):
             _append(row, new)
-        for series, function in zip(orbit, (mp.cos, mp.sin), strict=True):  # a derivative turns by a quarter
-            series.append(function(n * t + k * mp.pi / 2) * n**k / mp.factorial(k))
-        _append(u, [_convolve(R[0][i], orbit[0]) + _convolve(R[1][i], orbit[1]) for i in range(3)])
-        _append(Ju, _apply(J, [series[k] for series in u]))
-        g, world = [series[k] for series in R[2]], [[row[i][k] for row in R] for i in range(3)]
-        loads = _apply(world, motion.torque_W or none), _apply(motion.damping or [none] * 3, now)
-        torque = [
-            a + 3 * n * n * b + c - d + g[i - 2] * moment[i - 1] - g[i - 1] * moment[i - 2]
-            for i, (a, b, c, d) in enumerate(zip(_cross(L, w), _cross(u, Ju), *loads, strict=True))
-        ]
-        if motion.torque_B and k == 0:
-            torque = [a + b for a, b in zip(torque, motion.torque_B, strict=True)]
+        world = [[row[i][k] for row in R] for i in range(3)]
+        torque = [a - b + c for a, b, c in zip(_apply(world, f.world), _apply(f.damping, now), _cross(L, w), strict=True)]
+        torque = [a + _dot((R[2][i - 2][k], -R[2][i - 1][k]), (f.arm[i - 1], f.arm[i - 2])) for i, a in enumerate(torque)]
+        if k == 0:
+            torque = [a + b for a, b in zip(torque, f.body, strict=True)]
+        if f.orbit:
+            _append(u, [_convolve(R[0][i], planet[0]) + _convolve(R[1][i], planet[1]) for i in range(3)])
+            _append(Ju, _apply(f.J, [series[k] for series in u]))
+            torque = [a + (square * b >> BITS) for a, b in zip(torque, _cross(u, Ju), strict=True)]
         turn = [-sum(map(_convolve, q[1:], w)), *(_convolve(q[0], x) + b for x, b in zip(w, _cross(q[1:], w), strict=True))]
-        _append(y, [x / (k + 1) for x in (*(x / 2 for x in turn), *_apply(inverse, torque))])
-    powers = [h**k for k in range(TERMS + 1)]
-    return [mp.fdot(series, powers) for series in y]
+        along = [-(f.orbit * planet[1][k] >> BITS), f.orbit * planet[0][k] >> BITS]
+        _append(y, [x // (k + 1) for x in (*(x >> 1 for x in turn), *_apply(f.inverse, torque), *along)])
+    ends = []
+    for series in y:
+        end = 0
+        for coefficient in reversed(series):
+            end = (end * h >> BITS) + coefficient
+        ends.append(end)
+    return ends
 
 
-def _append(series: Any, new: Any, more: Any = None) -> None:
-    for i, coefficients in enumerate(series):
-        coefficients.append(new[i] + more[i] if more else new[i])
+def _append(series: Sequence[list[int]], new: Sequence[int]) -> None:
+    for coefficients, x in zip(series, new, strict=True):
+        coefficients.append(x)
 
 
 def _solve(motion: Motion) -> dict[str, Array]:
-    """Return the solution. The initial quaternion is normalised in multi-precision, other numbers are taken as exact."""
-    q = [mp.mpf(x) for x in motion.quaternion]
-    state, inverse = [*(x / mp.norm(q) for x in q), *map(mp.mpf, motion.rates)], (mp.matrix(motion.inertia_B) ** -1).tolist()
-    parts, t, rows = math.ceil(0.1 * motion.steps / ANGLE), mp.mpf(0), [_sample(motion, state)]
-    for end in motion.t:
-        h = (mp.mpf(end) - t) / parts
-        for i in range(parts):
-            state = _advance(motion, inverse, t + i * h, state, h)
-        t = mp.mpf(end)
-        rows.append(_sample(motion, state))
-    return {name: np.array([row[name] for row in rows]).astype(float) for name in SAMPLE}
+    """Return the solution. All numbers of the motion are taken as exact, and its quaternion is normalised."""
+    f, t = _Scaled(motion), Fraction(0)
+    state = [*f.quaternion, *f.rates, ONE, 0]
+    parts, rows = math.ceil(0.1 * motion.steps / ANGLE), [_sample(f, state)]
+    for end in map(Fraction, motion.t):
+        for _ in range(parts):
+            state = _advance(f, state, round((end - t) / f.step / parts * ONE))
+        t = end
+        rows.append(_sample(f, state))
+    return {name: np.array([row[name] for row in rows]) for name in SAMPLE}
 
 
-def _sample(motion: Motion, state: list[Any]) -> dict[str, Any]:
-    q, w = state[:4], state[4:]
-    R, L = _matrix(q), _apply(motion.inertia_B, w)
-    energy = mp.fdot(w, L) / 2
-    if motion.weight and motion.com_B:
-        energy += mp.mpf(motion.weight) * mp.fdot(R[2], map(mp.mpf, motion.com_B))
-    L = [a + b for a, b in zip(L, motion.rotor_momentum_B or (0, 0, 0), strict=True)]
-    return {"quaternion_wxyz": q, "R_WB": R, "w_WB_B": w, "w_WB_W": _apply(R, w), "energy": energy,
-            "momentum_W": _apply(R, L)}  # fmt: skip
+def _sample(f: _Scaled, state: list[int]) -> dict[str, Any]:
+    q, w = state[:4], state[4:7]
+    R, L = _matrix(q, lambda a, b: a * b >> BITS), _apply(f.J, w)
+    energy = _dot(w, L) // 2 + _dot(R[2], f.arm)
+    momentum = _apply(R, [a + b for a, b in zip(L, f.rotor, strict=True)])
+    return {"quaternion_wxyz": _round(q), "R_WB": _round(R), "w_WB_B": _round(w, 1 / f.step),
+            "w_WB_W": _round(_apply(R, w), 1 / f.step), "energy": _round(energy, f.size / f.step**2),
+            "momentum_W": _round(momentum, f.size / f.step)}  # fmt: skip
+
+
+def _round(x: Any, unit: Fraction = Fraction(1)) -> Any:
+    """Return multiples of 2^-`BITS` times a unit, each rounded once to a float."""
+    return [_round(part, unit) for part in x] if isinstance(x, list) else float(x * unit / ONE)

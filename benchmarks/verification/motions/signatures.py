@@ -6,7 +6,7 @@ mistake that are fitted to a recording have some typical values here.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -71,10 +71,15 @@ def _all() -> Iterator[tuple[str, Mistake, tuple[float, ...]]]:
             yield f"{key} {value:g}", mistake, (value,)
 
 
-def signatures(motions: Sequence[Motion]) -> list[dict[str, Samples]]:
-    """Return, for each motion, the attitudes and rates at the samples by the names of mistakes that change it."""
+def signatures(motions: Sequence[Motion], only: Collection[str] | None = None) -> list[dict[str, Samples]]:
+    """Return, for each motion, the attitudes and rates at the samples by the names of mistakes that change it.
+
+    `only` has the names that are wanted, by default all.
+    """
     out: list[dict[str, Samples]] = [{} for _ in motions]
     for name, mistake, numbers in _all():
+        if only is not None and name not in only:
+            continue
         if isinstance(mistake, Habit):
             for made, samples in zip(out, EXACT.run(motions, PARTS[-1], _keep(mistake, numbers)), strict=True):
                 made[name] = samples
@@ -82,7 +87,7 @@ def signatures(motions: Sequence[Motion]) -> list[dict[str, Samples]]:
         for motion, made in zip(motions, out, strict=True):
             if (changed := _with(motion, mistake, numbers)) is not None:
                 made[name] = changed
-    for motion, made in zip(motions, out, strict=True):
+    for motion, made in zip(motions, out, strict=True) if only is None or _BOTH in only else ():
         made[_BOTH] = _solve(Equations(motion.scene, gyroscopic=0.0, damping=BOTH[2]), motion.t)
     return out
 
