@@ -25,7 +25,8 @@ GRAVITY = 9.81
 """Acceleration, m/s^2, with which a weight is a mass."""
 TERMS, BITS, ANGLE = 60, 200, 0.2
 """The exact motion: terms of its Taylor series, bits of its numbers, and length of its steps, rad."""
-ONE = 2**BITS
+ONE, LEAST = 2**BITS, 2**40
+"""The integer that stands for 1, and the smallest one that is not noise."""
 KINDS = {"rotor_momentum_B": "rotor", "torque_B": "torque", "torque_W": "torque", "damping": "damping",
          "weight": "fixed point", "orbit": "orbit"}  # fmt: skip
 """The feature of a motion by its key; a motion without any of them is free."""
@@ -235,5 +236,7 @@ def _sample(f: _Scaled, state: list[int]) -> dict[str, Any]:
 
 
 def _round(x: Any, unit: Fraction = Fraction(1)) -> Any:
-    """Return multiples of 2^-`BITS` times a unit, each rounded once to a float."""
-    return [_round(part, unit) for part in x] if isinstance(x, list) else float(x * unit / ONE)
+    """Return multiples of 2^-`BITS` times a unit, each rounded once to a float. What the last bits leave of 0 is 0."""
+    if isinstance(x, list):
+        return [_round(part, unit) for part in x]
+    return float(x * unit / ONE) if abs(x) >= LEAST else 0.0
