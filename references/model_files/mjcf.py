@@ -34,6 +34,9 @@ _GENERATED = ("replicate", "composite", "flexcomp", "attach")
 _WHOLE = 1e-6
 """Largest difference of the volumes of a mesh and of its convex hull, relative to it, for a convex mesh."""
 
+OPTIONS = ("inertiagrouprange", "inertiafromgeom", "balanceinertia", "boundinertia", "boundmass", "settotalmass")
+"""Options of the compiler that change the body, without the units of angles."""
+
 Attributes = Mapping[str, str]
 
 
@@ -44,11 +47,11 @@ class NotRead(Exception):
 class Document:
     """An MJCF file: the options of its compiler and the attributes of its elements, after classes.
 
-    `root` is the element <mujoco> with the content of the files that it includes.
+    `root` is the element <mujoco> with the content of the files that it includes. `shells` is True after `weigh` of a shell.
     """
 
     def __init__(self, path: Path, root: Any, search: Sequence[Path] = ()) -> None:
-        self.path, self.root, self.search = path, root, search
+        self.path, self.root, self.search, self.shells = path, root, search, False
         self.options: dict[str, str] = {}
         for compiler in root.findall("compiler"):
             self.options.update(compiler.attrib)
@@ -115,14 +118,17 @@ class Document:
             return Rotation.from_matrix(np.transpose([x, y, np.cross(x, y)]))
         if "zaxis" in attributes:
             return _from_z(np.array(numbers(attributes["zaxis"], 3)))
-        if "euler" in attributes:  # small letters turn about axes that move along, which scipy writes in capitals
-            sequence = self.options.get("eulerseq", "xyz")
-            return Rotation.from_euler(sequence.swapcase(), unit * np.array(numbers(attributes["euler"], 3)))
+        if "euler" in attributes:
+            whole = Rotation.identity()
+            for letter, angle in zip(self.options.get("eulerseq", "xyz"), numbers(attributes["euler"], 3), strict=True):
+                step = Rotation.from_euler(letter.lower(), unit * angle)
+                whole = whole * step if letter.islower() else step * whole  # about axes that move along, or fixed ones
+            return whole
         quaternion = np.array(numbers(attributes.get("quat", "1 0 0 0"), 4))
         return Rotation.from_quat(quaternion, scalar_first=True) if quaternion.any() else Rotation.identity()
 
-    def weigh(self, geom: Any, place: Array) -> list[Piece]:
-        """Return the part of a geometry in a frame (4, 4); none for one without mass."""
+    def weigh(self, geom: Any, place: Array, solid: bool = False) -> list[Piece]:
+        """Return the part of a geometry in a frame (4, 4), with shells or all `solid`; none for one without mass."""
         attributes = self.attributes(geom, self.inherited(geom))
         kind, mesh = attributes.get("type", "sphere"), attributes.get("mesh")
         mass = number(attributes["mass"]) if "mass" in attributes else None
@@ -145,8 +151,9 @@ class Document:
             shape = shape[0] if kind == "sphere" else shape
         else:
             raise NotRead(f"a geometry of type {kind!r}")
+        self.shells |= shell
         # Parts of density 1 first: a mass comes before the density.
-        (part,) = (_shell if shell else weigh)(kind, shape, place @ pose, 1.0)
+        (part,) = (_shell if shell and not solid else weigh)(kind, shape, place @ pose, 1.0)
         return [part.scale(density if mass is None else mass / part.mass)]
 
     def _mesh(self, name: str) -> tuple[Array, Array, bool]:
@@ -209,24 +216,40 @@ def read_mjcf(path: Path, search: Sequence[Path], reading: Reading) -> list[Link
     """Return the links of a file with one body in the world, in its axes. Raise `NotRead` and `BadInput`."""
     root, *_ = inline(path, search)
     document = Document(path, root, search)
-    options = document.options
     if generated := next(root.iter(*_GENERATED), None):
         raise NotRead(f"<{generated.tag}>")
     bodies = [body for world in root.findall("worldbody") for body in _within(world, "body")]
     if len(bodies) != 1 or root.find("deformable") is not None:
         raise NotRead(f"{len(bodies)} bodies in the world, or flexible ones")
-    aligned = [joint.get("align", options.get("alignfree", "false")) for joint in root.iter("freejoint", "joint")]
-    if any(map(is_true, aligned)):
+    default = document.options.get("alignfree", "false")
+    if any(is_true(joint.get("align", default)) for joint in root.iter("freejoint", "joint")):
         reading.doubts.append("the axes of the body are its principal axes by an option of the file")
+    links = _read_links(document, bodies[0], document.options)
+    without = {
+        name: _read_links(document, bodies[0], {key: value for key, value in document.options.items() if key != name})
+        for name in OPTIONS
+        if name in document.options
+    }
+    if document.shells:
+        without["shellinertia"] = _read_links(document, bodies[0], document.options, solid=True)
+    alone = {name: [replace(other, pose=np.eye(4)).part for other in others] for name, others in without.items()}
+    return [replace(link, without={name: alone[name][k] for name in alone}) for k, link in enumerate(links)]
+
+
+def _read_links(document: Document, root: Any, options: Attributes, solid: bool = False) -> list[Link]:
+    """Return the links of a body with options of the compiler, with shells or all `solid`."""
     low, high = numbers(options.get("inertiagrouprange", "0 5"), 2)
     of_shapes = options.get("inertiafromgeom", "auto")
 
-    def read(body: Any, pose: Array) -> list[Link]:
+    def weigh_geoms(body: Any) -> Piece:
         parts = []
         for geom in _within(body, "geom"):
-            if low <= number(document.attributes(geom, document.inherited(geom)).get("group", "0")) <= high:
-                parts += document.weigh(geom, document.frame(geom, body))
-        geometry, inertial = join(parts), body.find("inertial")
+            group = document.attributes(geom, document.inherited(geom)).get("group", "0")
+            parts += document.weigh(geom, document.frame(geom, body), solid) if low <= number(group) <= high else []
+        return join(parts)
+
+    def read(body: Any, pose: Array) -> list[Link]:
+        geometry, inertial = weigh_geoms(body), body.find("inertial")
         link = Link(pose, name=body.get("name", ""), geometry=geometry)
         if inertial is not None and of_shapes != "true":
             link = _inertial(document, inertial, link)
@@ -242,7 +265,7 @@ def read_mjcf(path: Path, search: Sequence[Path], reading: Reading) -> list[Link
             links += read(child, pose @ document.frame(child, body) @ document.pose(child.attrib))
         return links
 
-    links = read(bodies[0], np.eye(4))
+    links = read(root, np.eye(4))
     if (total := number(options.get("settotalmass", "-1"))) > 0:
         factor = total / join_links(links).mass
         return [replace(k, mass=factor * k.mass, inertia=factor * k.inertia, geometry=k.geometry.scale(factor)) for k in links]

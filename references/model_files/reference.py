@@ -129,8 +129,8 @@ def by_usd_core(path: Path) -> tuple[Piece, list[str]]:
         mass, moments, com, q = UsdPhysics.RigidBodyAPI(prim).ComputeMassProperties(weigh_collider)
         if refusals:
             raise Refused(refusals[0])
-        axes = UsdPhysics.MassAPI(prim).GetPrincipalAxesAttr()
-        if not used and not (axes and axes.HasAuthoredValue()):
+        given = UsdPhysics.MassAPI(prim).GetPrincipalAxesAttr()
+        if not used and not (given and given.HasAuthoredValue() and given.Get().GetLength()):
             q = Gf.Quatf(1)  # usd-core returns memory that it has not written
         place = Gf.Transform(cache.GetLocalToWorldTransform(prim))
         # Gf multiplies rows from the left, so its matrices are transposed.

@@ -110,7 +110,10 @@ class Stage:
         """Return the part of a collider after a map `pose` (4, 4), with lengths in the units of the stage before it."""
         kind = prim.GetTypeName().lower()
         if kind == "mesh":
-            return weigh(kind, list(_triangles(prim)), pose, density)[0]
+            points, triangles = _triangles(prim)
+            if not np.linalg.det(points[triangles].astype(float)).sum():
+                raise refuse(self.path, f"the collider {str(prim.GetPath())!r}, a mesh without a volume", "a closed mesh")
+            return weigh(kind, [points, triangles], pose, density)[0]
         if kind not in _SHAPES:
             allowed = f"colliders whose volume is known: mesh, {', '.join(_SHAPES)}"
             raise refuse(self.path, f"the collider {str(prim.GetPath())!r} of type {prim.GetTypeName()!r}", allowed)
@@ -171,14 +174,19 @@ def _transform(prim: Any) -> tuple[Array, bool]:
 
 
 def _operation(kind: str, value: Any) -> Array:
-    """Return the map (4, 4) of an operation of `xformOpOrder`, such as "rotateXYZ": about fixed axes, X first, degrees."""
+    """Return the map (4, 4) of an operation of `xformOpOrder`.
+
+    "rotateZXY" turns about fixed axes, Z first, by angles in degrees, which are always in the order X, Y, Z.
+    """
     if kind == "transform":
         return np.array(value, float).T  # USD multiplies rows from the left
     if kind == "orient":
         q = np.array([*value.GetImaginary(), value.GetReal()], float)
         return make_pose(R=Rotation.from_quat(q) if q.any() else None)
     if kind.startswith("rotate"):
-        return make_pose(R=Rotation.from_euler(kind.removeprefix("rotate").lower(), np.array(value, float), degrees=True))
+        letters = kind.removeprefix("rotate")
+        angles = np.array(value, float)[["XYZ".index(letter) for letter in letters]] if len(letters) == 3 else float(value)
+        return make_pose(R=Rotation.from_euler(letters.lower(), angles, degrees=True))
     axis = kind[-1] if kind[-1] in "XYZ" else ""
     numbers = np.full(3, 1.0 if kind.startswith("scale") else 0.0)
     numbers["XYZ".index(axis) if axis else slice(None)] = np.array(value, float)
