@@ -301,7 +301,7 @@ _ALL = _mujoco, _pinocchio, _drake, _dart, _pybullet, _newton, _sapien, _brax, _
 LOADERS = {loader.__name__[1:]: loader for loader in _ALL}
 """Loaders by the names of engines."""
 
-FAMILIES = {
+FAMILIES: dict[str, dict[str, tuple[str, ...]]] = {
     "urdf": {
         "urdfdom": ("pinocchio", "dart"),
         "MuJoCo": ("mujoco", "mujoco_js", "mjx", "mjwarp"),
@@ -313,6 +313,6 @@ FAMILIES = {
 """Engines that read a format with the same parser, by format and parser. All other engines have a parser of their own."""
 
 
-def family(engine, kind):
+def family(engine: str, kind: str) -> str:
     """Return the name of the parser with which an engine reads files of a kind."""
     return next((name for name, engines in FAMILIES.get(kind, {}).items() if engine in engines), engine)

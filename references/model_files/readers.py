@@ -120,9 +120,7 @@ class Model(Reading):
     def _asks(self, engine: str) -> dict[str, str]:
         """Return the options of the file for an engine that change this body."""
         same = family(engine, self.kind)  # `mujoco` stands for all engines that read with MuJoCo
-        asked = {
-            key: text for name, asks in self.asks.items() if same == family(name, self.kind) for key, text in asks.items()
-        }
+        asked = {key: text for name, asks in self.asks.items() if same == family(name, self.kind) for key, text in asks.items()}
         possible = not self.truth.flaw and not self.bad
         return {key: text for key, text in asked.items() if not (possible and key == "balanceinertia")}
 

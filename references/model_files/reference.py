@@ -1,18 +1,20 @@
 """The reference readings of model files: the body by the implementation of its format. SDF is read by libsdformat in Drake.
 
-Nothing here uses a function of this package, and the second readings (`description`, `mjcf`, `usd`) use nothing of this file. A
-test traces both. Files are checked before (`files.guard`).
+Nothing here uses a function of this package outside this file, and the second readings (`description`, `mjcf`, `usd`) use
+nothing of this file. A test traces both. Files are checked before (`files.guard`).
 
 * URDF: urdfdom in Pinocchio, which adds up fixed links.
 * MJCF: MuJoCo parses and compiles the file. The sum over fixed bodies is computed here.
-* USD: usd-core opens the stage, finds bodies, joints and colliders with their sizes and poses (`UsdPhysics`, `UsdGeom`, `Gf`), and
-  adds up the mass (`ComputeMassProperties`). It has no volumes: those of shapes are computed here by quadrature over slices, and
-  those of meshes by trimesh.
+* USD: usd-core opens the stage, finds bodies, joints and colliders with their sizes and poses (`UsdPhysics`, `UsdGeom`, `Gf`),
+  and adds up the mass (`ComputeMassProperties`). It has no volumes: volumes of shapes are computed here by quadrature over
+  slices, and volumes of meshes by trimesh.
 """
 
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +44,7 @@ def by_urdfdom(path: Path) -> tuple[Piece, list[str]]:
 
 
 def by_mujoco(path: Path) -> tuple[Piece, list[str]]:
-    """Return the body that MuJoCo compiles of a file with one free body, in its axes, and MuJoCo's warnings. Raise `Refused`."""
+    """Return the body that MuJoCo compiles of a file with one free body, in its axes, and the warnings. Raise `Refused`."""
     import mujoco
 
     with warnings.catch_warnings(record=True) as caught:
@@ -110,7 +112,7 @@ def by_usd_core(path: Path) -> tuple[Piece, list[str]]:
         raise Refused("no rigid body")
     cache, parts, refusals = UsdGeom.XformCache(), [], []
     for body in bodies:
-        prim, used = stage.GetPrimAtPath(body.primPath), []
+        prim, used = stage.GetPrimAtPath(body.primPath), list[Any]()
 
         def weigh_collider(collider: Any, used: list[Any] = used) -> Any:
             info = UsdPhysics.RigidBodyAPI.MassInformation()
@@ -156,41 +158,45 @@ def _weigh(desc: Any, prim: Any) -> tuple[float, Array, Array]:
         return _weigh_mesh(np.array(prim.GetAttribute("points").Get()) * np.array(desc.meshScale, float), prim)
     if kind == kinds.CubeShape:
         a, b, c = np.abs(desc.halfExtents)
-        return _stack(c, lambda z: a + 0 * z, lambda z: b + 0 * z, round_=False)
+        return _stack(c, lambda z: (a + 0 * z, b + 0 * z), rectangles=True)
     if kind == kinds.SphereShape:
-        r = desc.radius
-        return _stack(r, *[lambda z: np.sqrt(np.maximum(r * r - z * z, 0))] * 2)
+        return _stack(desc.radius, lambda z: 2 * (np.sqrt(np.maximum(desc.radius**2 - z * z, 0)),))
     if kind not in (kinds.CylinderShape, kinds.CapsuleShape, kinds.ConeShape):
         raise Refused(f"the collider {str(prim.GetPath())!r} of type {prim.GetTypeName()!r}")
     r, h = desc.radius, desc.halfHeight
     if kind == kinds.CylinderShape:
-        volume, centre, inertia = _stack(h, *[lambda z: r + 0 * z] * 2)
+        volume, centre, inertia = _stack(h, lambda z: 2 * (r + 0 * z,))
     elif kind == kinds.ConeShape:
-        volume, centre, inertia = _stack(h, *[lambda z: r * (h - z) / (2 * h)] * 2)
+        volume, centre, inertia = _stack(h, lambda z: 2 * (r * (h - z) / (2 * h),))
     else:
-        rounded = [lambda z: np.sqrt(np.maximum(r * r - np.maximum(np.abs(z) - h, 0) ** 2, 0))] * 2
-        volume, centre, inertia = _stack(h + r, *rounded, breaks=(-h, h))
+        volume, centre, inertia = _stack(
+            h + r, lambda z: 2 * (np.sqrt(np.maximum(r * r - np.maximum(np.abs(z) - h, 0) ** 2, 0)),), breaks=(-h, h)
+        )
     order = {"X": (2, 0, 1), "Y": (1, 2, 0), "Z": (0, 1, 2)}[prim.GetAttribute("axis").Get()]  # z becomes the axis of the shape
     return volume, centre[list(order)], inertia[np.ix_(order, order)]
 
 
 def _stack(
-    half: float, a: Any, b: Any, round_: bool = True, breaks: tuple[float, ...] = ()
+    half: float,
+    widths: Callable[[Array], tuple[Array, ...]],
+    rectangles: bool = False,
+    breaks: tuple[float, ...] = (),
 ) -> tuple[float, Array, Array]:
     """Return volume, centroid and inertia of a stack of slices between -half and half along z.
 
-    Slices are ellipses, or rectangles, with half widths a(z) and b(z). The integrands are polynomials of a degree up to 4
-    between the `breaks`, so the quadrature is exact.
+    Slices are ellipses, or rectangles, with two half widths at z. The integrands are polynomials of a degree up to 4 between
+    the `breaks`, so the quadrature is exact.
     """
     nodes, weights = np.polynomial.legendre.leggauss(8)
     edges = [-half, *breaks, half]
-    z = np.concatenate([(low + high) / 2 + (high - low) / 2 * nodes for low, high in zip(edges, edges[1:], strict=False)])
-    w = np.concatenate([(high - low) / 2 * weights for low, high in zip(edges, edges[1:], strict=False)])
-    area, share = (np.pi, 4) if round_ else (4, 3)
-    dV = w * area * a(z) * b(z)
+    z = np.concatenate([(low + high) / 2 + (high - low) / 2 * nodes for low, high in pairwise(edges)])
+    w = np.concatenate([(high - low) / 2 * weights for low, high in pairwise(edges)])
+    area, share = (4, 3) if rectangles else (np.pi, 4)
+    a, b = widths(z)
+    dV = w * area * a * b
     volume = dV.sum()
     centre = (dV * z).sum() / volume
-    xx, yy, zz = (dV * a(z) ** 2 / share).sum(), (dV * b(z) ** 2 / share).sum(), (dV * (z - centre) ** 2).sum()
+    xx, yy, zz = (dV * a**2 / share).sum(), (dV * b**2 / share).sum(), (dV * (z - centre) ** 2).sum()
     return volume, np.array([0, 0, centre]), np.diag([yy + zz, xx + zz, xx + yy])
 
 

@@ -1,8 +1,7 @@
 """Rigid bodies of USD files from their attributes, by the rules of UsdPhysics: the second reading.
 
-usd-core composes the layers and returns the values of attributes and materials, because there is no other implementation of that.
-Which prims are bodies and colliders, poses, units and the sums over them are computed here. The first reading is
-`reference.by_usd_core`.
+usd-core composes the layers and returns the values of attributes and materials: there is no other implementation of that. Which
+prims are bodies and colliders, poses, units and sums are computed here. The first reading is `reference.by_usd_core`.
 
 A round shape whose scale differs by axis is an ellipsoid here, as it is drawn; usd-core's parser takes the largest scale.
 """

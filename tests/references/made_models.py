@@ -178,30 +178,47 @@ def mesh(points, faces, *lines):
     )
 
 
-def usd_cases():
-    heavy = 500.0
-    plain = box(1, 1, 1, heavy)
+HEAVY = 500.0
+PLAIN = box(1, 1, 1, HEAVY)
+STRETCH = placed(move(*T), size(*S))
+R = turn((1, 2, -1), 40)
+QUATERNION = np.array(about((1, 2, -1), 40))
+GIVEN = (
+    "float physics:mass = 2",
+    f"point3f physics:centerOfMass = {row(T)}",
+    "float3 physics:diagonalInertia = (1, 2, 2.5)",
+)
+"""Mass, centre and moments of a body."""
+
+
+def inside(*ops):
+    """What is before and after a body within another prim."""
+    return prim("Xform", "p", (), placed(*ops), "%s").split("%s")
+
+
+def usd_turns():
     for order in ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"):  # the first axis turns first
         angles = dict(zip("XYZ", (20, -50, 70), strict=True))
-        R = I3
+        turned = I3
         for axis in order:
-            R = turn(AXES[axis], angles[axis]) @ R
+            turned = turn(AXES[axis], angles[axis]) @ turned
         ops = placed(move(*T), (f"rotate{order}", "float3", row(angles.values())), size(*S))
-        yield f"rotate{order}", usd(cube(DENSE, ops)), plain.mapped(R * S, T)
-    for axis, R in AXES.items():
+        yield f"rotate{order}", usd(cube(DENSE, ops)), PLAIN.mapped(turned * S, T)
+    for axis, direction in AXES.items():
         ops = placed(move(*T), (f"rotate{axis}", "float", "35"), size(*S))
-        yield f"rotate{axis}", usd(cube(DENSE, ops)), plain.mapped(turn(R, 35) * S, T)
-    R = turn((1, 2, -1), 40)
+        yield f"rotate{axis}", usd(cube(DENSE, ops)), PLAIN.mapped(turn(direction, 35) * S, T)
     for kind in ("quatf", "quatd"):
-        ops = placed(move(*T), ("orient", kind, row(about((1, 2, -1), 40))), size(*S))
-        yield f"orient {kind}", usd(cube(DENSE, ops)), plain.mapped(R * S, T)
-    twice = [2 * value for value in about((1, 2, -1), 40)]
-    ops = placed(move(*T), ("orient", "quatd", row(twice)), size(*S))
+        ops = placed(move(*T), ("orient", kind, row(QUATERNION)), size(*S))
+        yield f"orient {kind}", usd(cube(DENSE, ops)), PLAIN.mapped(R * S, T)
+    ops = placed(move(*T), ("orient", "quatd", row(2 * QUATERNION)), size(*S))
     yield "orient of norm 2", usd(cube(DENSE, ops)), None
     matrix = np.eye(4)
     matrix[:3, :3], matrix[3, :3] = (R * S).T, T
     ops = placed(("transform", "matrix4d", "(" + ", ".join(map(row, matrix)) + ")"))
-    yield "transform", usd(cube(DENSE, ops)), plain.mapped(R * S, T)
+    yield "transform", usd(cube(DENSE, ops)), PLAIN.mapped(R * S, T)
+
+
+def usd_parents():
     pivot = np.array((0.3, 0.1, -0.2))
     ops = placed(
         move(*T),
@@ -211,40 +228,41 @@ def usd_cases():
         ("!invert!xformOp:translate:pivot",),
     )
     A = turn(Z, 90) * S
-    yield "pivot", usd(cube(DENSE, ops)), plain.mapped(A, T + pivot - A @ pivot)
+    yield "pivot", usd(cube(DENSE, ops)), PLAIN.mapped(A, T + pivot - A @ pivot)
     ops = placed(("!resetXformStack!",), move(*T), size(*S))
-    yield "reset", usd(placed(move(1, 2, 3)), cube(DENSE, ops)), plain.mapped(np.diag(S), np.array(T) - (1, 2, 3))
+    yield "reset", usd(placed(move(1, 2, 3)), cube(DENSE, ops)), PLAIN.mapped(np.diag(S), np.array(T) - (1, 2, 3))
     ops = placed(move(*T), ("rotateX", "float", "30"), size(*S))
-    inner = plain.mapped(turn(X, 30) * S, T)
-    parent = prim("Xform", "p", (), placed(move(7, 8, 9), ("rotateZ", "float", "80")), "%s").split("%s")
+    inner = PLAIN.mapped(turn(X, 30) * S, T)
+    parent = inside(move(7, 8, 9), ("rotateZ", "float", "80"))
     own = placed(move(1, 2, 3), ("rotateXYZ", "float3", "(10, 20, 30)"))
     yield "placed body and parent", usd(own, cube(DENSE, ops), around=parent), inner
-    parent = prim("Xform", "p", (), placed(("rotateZ", "float", "80"), size(2, 2, 2)), "%s").split("%s")
+    parent = inside(("rotateZ", "float", "80"), size(2, 2, 2))
     yield "parent twice as large", usd(own, cube(DENSE, ops), around=parent), inner.mapped(2 * I3)
-    parent = prim("Xform", "p", (), placed(size(1, 2, 3)), "%s").split("%s")
+    parent = inside(size(1, 2, 3))
     ops = placed(move(*T), size(*S))
-    stretched = plain.mapped(np.diag(S), T).mapped(np.diag((1, 2, 3)))
+    stretched = PLAIN.mapped(np.diag(S), T).mapped(np.diag((1, 2, 3)))
     yield "parent stretched", usd(cube(DENSE, ops), around=parent), stretched
-    given = ("float physics:mass = 2", f"point3f physics:centerOfMass = {row(T)}", "float3 physics:diagonalInertia = (1, 2, 2.5)")
-    yield "centre of a stretched body", usd(*given, around=parent), Piece(2.0, np.multiply(T, (1, 2, 3)), np.diag([1, 2, 2.5]))
+    yield "centre of a stretched body", usd(*GIVEN, around=parent), Piece(2.0, np.multiply(T, (1, 2, 3)), np.diag([1, 2, 2.5]))
     groups = prim("Scope", "s", (), prim("Xform", "x", (), placed(move(*T)), prim("Scope", "t", (), cube(DENSE))))
-    yield "scopes", usd(groups), plain.mapped(t=T)
-    # Mirrored and sheared frames.
+    yield "scopes", usd(groups), PLAIN.mapped(t=T)
+
+
+def usd_mirrors():
     for s in ((-1, 2, 3), (1, -2, 3), (1, 2, -3), (-1, -2, 3), (-1, -2, -3)):
         for what, solid, made in (
-            ("box", plain, cube(DENSE, placed(move(*T), ("rotateX", "float", "30"), size(*s)))),
+            ("box", PLAIN, cube(DENSE, placed(move(*T), ("rotateX", "float", "30"), size(*s)))),
             (
                 "mesh",
-                tetrahedron(heavy),
+                tetrahedron(HEAVY),
                 mesh(POINTS, FACES, DENSE, placed(move(*T), ("rotateX", "float", "30"), size(*s))),
             ),
         ):
             yield f"{what} mirrored {words(s)}", usd(made), solid.mapped(turn(X, 30) * s, T)
     for kind, solid in (
-        ("Sphere", sphere(1, heavy)),
-        ("Cylinder", cylinder(0.4, 1.2, heavy)),
-        ("Capsule", capsule(0.4, 1.2, heavy)),
-        ("Cone", cone(0.4, 1.2, heavy)),
+        ("Sphere", sphere(1, HEAVY)),
+        ("Cylinder", cylinder(0.4, 1.2, HEAVY)),
+        ("Capsule", capsule(0.4, 1.2, HEAVY)),
+        ("Cone", cone(0.4, 1.2, HEAVY)),
     ):
         for s in ((-2, 2, 2), (2, 2, -2)):
             drawn = None if kind == "Cone" else solid.mapped(np.diag(s), T)  # usd-core turns a mirrored cone upside down
@@ -255,21 +273,30 @@ def usd_cases():
             onto_x = np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0.0]])
             yield f"{kind} along X", usd(made), solid.mapped(onto_x, T)
         yield f"{kind} stretched across its axis", usd(cube(DENSE, placed(size(1, 2, 1)), kind=kind)), None
-    yield "mirrored body", usd(placed(size(-1, 1, 1)), *given), None
-    mirror = prim("Xform", "p", (), placed(("rotateX", "float", "30"), size(1, 1, -1)), "%s").split("%s")
-    yield "mirrored parent", usd(cube(DENSE, ops), around=mirror), None
+    yield "mirrored body", usd(placed(size(-1, 1, 1)), *GIVEN), None
+    mirror = inside(("rotateX", "float", "30"), size(1, 1, -1))
+    yield "mirrored parent", usd(cube(DENSE, STRETCH), around=mirror), None
     shear = prim("Xform", "s", (), placed(size(1, 2, 3)), cube(DENSE, placed(("rotateX", "float", "30"))))
     yield "sheared collider", usd(shear), None
-    # Units.
+
+
+def usd_values():
     for metre, kilogram in ((0.01, 1), (1, 0.001), (0.01, 0.001), (0.0254, 0.4536)):
         made = usd(cube(DENSE, placed(move(*T), size(*S))), units=(metre, kilogram))
-        solid = plain.mapped(np.diag(S), T)
-        yield f"units {metre} {kilogram}", made, Solid(solid.mass * kilogram, solid.centre * metre, solid.second * kilogram * metre**2)
+        solid = PLAIN.mapped(np.diag(S), T)
+        yield (
+            f"units {metre} {kilogram}",
+            made,
+            Solid(solid.mass * kilogram, solid.centre * metre, solid.second * kilogram * metre**2),
+        )
         made = usd(cube(placed(move(*T), size(*S))), units=(metre, kilogram))
-        yield f"default density, units {metre} {kilogram}", made, box(1, 1, 1, 1000).mapped(metre * np.diag(S), metre * np.array(T))
-    # Values that do not count, and those that come first.
-    ops = placed(move(*T), size(*S))
-    seen = plain.mapped(np.diag(S), T)
+        yield (
+            f"default density, units {metre} {kilogram}",
+            made,
+            box(1, 1, 1, 1000).mapped(metre * np.diag(S), metre * np.array(T)),
+        )
+    ops = STRETCH
+    seen = PLAIN.mapped(np.diag(S), T)
     mass, density = "float physics:mass = {}", "float physics:density = {}"
     for value in ("-1", "0", "-0.0"):
         yield f"mass {value} of the body", usd(mass.format(value), DENSE, cube(ops)), seen
@@ -282,28 +309,44 @@ def usd_cases():
     yield "no centre", usd("point3f physics:centerOfMass = (-inf, -inf, -inf)", cube(DENSE, ops)), seen
     axes = "quatf physics:principalAxes = {}"
     moments = np.diag([1, 2, 2.5])
-    yield "no axes", usd(*given, axes.format("(0, 0, 0, 0)")), Piece(2.0, np.array(T), moments)
+    yield "no axes", usd(*GIVEN, axes.format("(0, 0, 0, 0)")), Piece(2.0, np.array(T), moments)
     turned = Piece(2.0, np.array(T), R @ moments @ R.T)
-    yield "axes", usd(*given, axes.format(row(about((1, 2, -1), 40)))), turned
-    yield "axes of norm 2", usd(*given, axes.format(row(twice))), turned
+    yield "axes", usd(*GIVEN, axes.format(row(QUATERNION))), turned
+    yield "axes of norm 2", usd(*GIVEN, axes.format(row(2 * QUATERNION))), turned
     off = cube("bool physics:collisionEnabled = 0", mass.format(9), name="d")
     yield "a collider that is off", usd(cube(DENSE, ops), off), seen
-    # Bodies below the body.
     below = prim("Xform", "e", (BODY,), "bool physics:rigidBodyEnabled = 0", placed(move(2, 0, 0)), cube(DENSE))
-    yield "a body below that is off", usd(cube(DENSE, ops), below), whole(seen, plain.mapped(t=(2, 0, 0)))
-    deep = prim("Xform", "e", (BODY,), "bool physics:rigidBodyEnabled = 0", prim("Xform", "f", (), placed(move(2, 0, 0)), cube(DENSE)))
-    yield "deep below a body that is off", usd(cube(DENSE, ops), deep), whole(seen, plain.mapped(t=(2, 0, 0)))
-    # Meshes.
-    yield "mesh", usd(mesh(POINTS, FACES, DENSE, ops)), tetrahedron(heavy).mapped(np.diag(S), T)
-    yield "mesh inside out", usd(mesh(POINTS, [face[::-1] for face in FACES], DENSE, ops)), tetrahedron(heavy).mapped(np.diag(S), T)
-    yield "mesh of squares", usd(mesh(CUBE, QUADS, DENSE)), plain.mapped(t=(0.5, 0.5, 0.5))
+    yield "a body below that is off", usd(cube(DENSE, ops), below), whole(seen, PLAIN.mapped(t=(2, 0, 0)))
+    deep = prim(
+        "Xform", "e", (BODY,), "bool physics:rigidBodyEnabled = 0", prim("Xform", "f", (), placed(move(2, 0, 0)), cube(DENSE))
+    )
+    yield "deep below a body that is off", usd(cube(DENSE, ops), deep), whole(seen, PLAIN.mapped(t=(2, 0, 0)))
+
+
+def usd_meshes():
+    ops = STRETCH
+    yield "mesh", usd(mesh(POINTS, FACES, DENSE, ops)), tetrahedron(HEAVY).mapped(np.diag(S), T)
+    yield (
+        "mesh inside out",
+        usd(mesh(POINTS, [face[::-1] for face in FACES], DENSE, ops)),
+        tetrahedron(HEAVY).mapped(np.diag(S), T),
+    )
+    yield "mesh of squares", usd(mesh(CUBE, QUADS, DENSE)), PLAIN.mapped(t=(0.5, 0.5, 0.5))
     apart = [POINTS[corner] for face in FACES for corner in face]
     loose = [(3 * k, 3 * k + 1, 3 * k + 2) for k in range(4)]
-    yield "mesh of loose triangles", usd(mesh(apart, loose, DENSE)), tetrahedron(heavy)
-    yield "mesh and its convex hull", usd(mesh(POINTS, FACES, DENSE, 'uniform token physics:approximation = "convexHull"')), tetrahedron(heavy)
+    yield "mesh of loose triangles", usd(mesh(apart, loose, DENSE)), tetrahedron(HEAVY)
+    yield (
+        "mesh and its convex hull",
+        usd(mesh(POINTS, FACES, DENSE, 'uniform token physics:approximation = "convexHull"')),
+        tetrahedron(HEAVY),
+    )
     yield "open mesh", usd(mesh(POINTS, FACES[1:], DENSE)), None
     yield "mesh that is not convex", usd(mesh(ELL_POINTS, ELL_FACES, DENSE)), None
-    yield "hull of a mesh that is not convex", usd(mesh(ELL_POINTS, ELL_FACES, DENSE, 'uniform token physics:approximation = "convexHull"')), None
+    yield (
+        "hull of a mesh that is not convex",
+        usd(mesh(ELL_POINTS, ELL_FACES, DENSE, 'uniform token physics:approximation = "convexHull"')),
+        None,
+    )
     yield "box around a mesh", usd(mesh(POINTS, FACES, DENSE, 'uniform token physics:approximation = "boundingCube"')), None
 
 
@@ -314,41 +357,60 @@ def mjcf(*inside, head=""):
     return f'<mujoco model="m">{head}<worldbody><body name="b"><freejoint/>{"".join(inside)}</body></worldbody></mujoco>'
 
 
-def mjcf_cases():
-    pos = f'pos="{words(T)}"'
-    brick = f'<geom type="box" size="{words(np.divide(S, 2))}" density="500" {pos} {{}}/>'
-    plain = box(*S, 500)
-    R = turn((1, 2, -1), 40)
-    q = np.array(about((1, 2, -1), 40))
-    yield "quaternion", mjcf(brick.format(f'quat="{words(q)}"')), plain.mapped(R, T)
-    yield "quaternion of norm 3", mjcf(brick.format(f'quat="{words(3 * q)}"')), plain.mapped(R, T)
-    yield "axis of norm 3", mjcf(brick.format('axisangle="3 6 -3 40"')), plain.mapped(R, T)
-    yield "radians", mjcf(brick.format(f'axisangle="1 2 -1 {math.radians(40)!r}"'), head='<compiler angle="radian"/>'), plain.mapped(R, T)
+POS = f'pos="{words(T)}"'
+GEOM = f'<geom type="box" size="{words(np.divide(S, 2))}" density="500" {POS} {{}}/>'
+BRICK = box(*S, 500)
+"""A geometry with places for further attributes, and its part in its own axes."""
+
+
+def mjcf_turns():
+    yield "quaternion", mjcf(GEOM.format(f'quat="{words(QUATERNION)}"')), BRICK.mapped(R, T)
+    yield "quaternion of norm 3", mjcf(GEOM.format(f'quat="{words(3 * QUATERNION)}"')), BRICK.mapped(R, T)
+    yield "axis of norm 3", mjcf(GEOM.format('axisangle="3 6 -3 40"')), BRICK.mapped(R, T)
+    yield (
+        "radians",
+        mjcf(GEOM.format(f'axisangle="1 2 -1 {math.radians(40)!r}"'), head='<compiler angle="radian"/>'),
+        BRICK.mapped(R, T),
+    )
     skewed = R[:, 1] + 0.3 * R[:, 0]
-    yield "axes that are not at right angles", mjcf(brick.format(f'xyaxes="{words([*(2 * R[:, 0]), *skewed])}"')), plain.mapped(R, T)
-    yield "z axis", mjcf(brick.format('zaxis="0 3 0"')), plain.mapped(turn(X, -90), T)
-    yield "z axis down", mjcf(brick.format('zaxis="0 0 -1"')), plain.mapped(turn(X, 180), T)
+    yield (
+        "axes that are not at right angles",
+        mjcf(GEOM.format(f'xyaxes="{words([*(2 * R[:, 0]), *skewed])}"')),
+        BRICK.mapped(R, T),
+    )
+    yield "z axis", mjcf(GEOM.format('zaxis="0 3 0"')), BRICK.mapped(turn(X, -90), T)
+    yield "z axis down", mjcf(GEOM.format('zaxis="0 0 -1"')), BRICK.mapped(turn(X, 180), T)
     for sequence in ("xyz", "XYZ", "zyx", "ZYX", "xzX"):
         turned = I3
         for letter, angle in zip(sequence, (20, -50, 70), strict=True):
             step = turn(AXES[letter.upper()], angle)
             turned = turned @ step if letter.islower() else step @ turned
         head = f'<compiler eulerseq="{sequence}"/>'
-        yield f"euler {sequence}", mjcf(brick.format('euler="20 -50 70"'), head=head), plain.mapped(turned, T)
-    frame = f'<frame pos="1 2 3" axisangle="0 0 1 90"><frame euler="30 0 0">{brick.format("")}</frame></frame>'
-    yield "frames", mjcf(frame), plain.mapped(t=T).mapped(turn(X, 30)).mapped(turn(Z, 90), (1, 2, 3))
-    lower = f'<body name="c" pos="1 2 3" axisangle="0 0 1 90">{brick.format("")}</body>'
-    yield "fixed body", mjcf(brick.format(""), lower), whole(plain.mapped(t=T), plain.mapped(t=T).mapped(turn(Z, 90), (1, 2, 3)))
+        yield f"euler {sequence}", mjcf(GEOM.format('euler="20 -50 70"'), head=head), BRICK.mapped(turned, T)
+    frame = f'<frame pos="1 2 3" axisangle="0 0 1 90"><frame euler="30 0 0">{GEOM.format("")}</frame></frame>'
+    yield "frames", mjcf(frame), BRICK.mapped(t=T).mapped(turn(X, 30)).mapped(turn(Z, 90), (1, 2, 3))
+    lower = f'<body name="c" pos="1 2 3" axisangle="0 0 1 90">{GEOM.format("")}</body>'
+    yield (
+        "fixed body",
+        mjcf(GEOM.format(""), lower),
+        whole(BRICK.mapped(t=T), BRICK.mapped(t=T).mapped(turn(Z, 90), (1, 2, 3))),
+    )
     framed = f'<frame euler="30 0 0">{lower}</frame>'
-    both = whole(plain.mapped(t=T), plain.mapped(t=T).mapped(turn(Z, 90), (1, 2, 3)).mapped(turn(X, 30)))
-    yield "fixed body in a frame", mjcf(brick.format(""), framed), both
+    both = whole(BRICK.mapped(t=T), BRICK.mapped(t=T).mapped(turn(Z, 90), (1, 2, 3)).mapped(turn(X, 30)))
+    yield "fixed body in a frame", mjcf(GEOM.format(""), framed), both
+
+
+def mjcf_classes():
     classes = f'<default><geom density="500"/><default class="p"><geom type="box" size="{words(np.divide(S, 2))}"/>'
     classes += '<default class="q"><geom size="0.3" mass="2"/></default></default></default>'
-    yield "class", mjcf(f'<geom class="p" {pos}/>', head=classes), plain.mapped(t=T)
+    yield "class", mjcf(f'<geom class="p" {POS}/>', head=classes), BRICK.mapped(t=T)
     part = box(0.6, S[1], S[2]).mapped(t=T, mass=2.0)
-    yield "class within a class", mjcf(f'<geom class="q" {pos}/>', head=classes), part
-    inside = f'<frame childclass="p"><geom {pos}/><geom class="q" {pos}/></frame>'
-    yield "class of a frame", mjcf(inside, head=classes), whole(plain.mapped(t=T), part)
+    yield "class within a class", mjcf(f'<geom class="q" {POS}/>', head=classes), part
+    inside = f'<frame childclass="p"><geom {POS}/><geom class="q" {POS}/></frame>'
+    yield "class of a frame", mjcf(inside, head=classes), whole(BRICK.mapped(t=T), part)
+
+
+def mjcf_shapes():
     ends = np.array((0.1, -0.2, 0.3)), np.array((0.4, 0.2, 0.3))
     length = float(np.linalg.norm(ends[1] - ends[0]))
     to_x = np.column_stack([(0, 0, 1), (0.8, -0.6, 0), (0.6, 0.8, 0)])  # z becomes the direction of the ends
@@ -360,6 +422,9 @@ def mjcf_cases():
     ):
         geom = f'<geom type="{kind}" size="0.1" fromto="{words([*ends[0], *ends[1]])}"/>'
         yield f"{kind} from to", mjcf(geom), solid.mapped(to_x, middle)
+
+
+def mjcf_shells():
     geom = '<geom type="{}" size="{}" {} shellinertia="true" pos="0.1 0 0" axisangle="0 0 1 90"/>'
     a, b, c = 0.2, 0.4, 0.6
     shells = {
@@ -370,22 +435,29 @@ def mjcf_cases():
     discs = [Solid(end, (0, 0, z), end * 0.01 / 4 * np.diag([1, 1, 0])) for z in (-0.2, 0.2)]
     tube = Solid(side, (0, 0, 0), side * np.diag([0.005, 0.005, 0.16 / 12]))
     # A half of a spherical surface: the centroid at r/2, second moments r^2/3 about the centre.
-    caps = [
-        Solid(2 * end, (0, 0, sign * 0.25), 2 * end * (0.01 / 3 * I3 - np.diag([0, 0, 0.0025]))) for sign in (-1, 1)
-    ]
+    caps = [Solid(2 * end, (0, 0, sign * 0.25), 2 * end * (0.01 / 3 * I3 - np.diag([0, 0, 0.0025]))) for sign in (-1, 1)]
     shells |= {"cylinder": ("0.1 0.2", [tube, *discs]), "capsule": ("0.1 0.2", [tube, *caps])}
     for kind, (sizes, parts) in shells.items():
         moved = [part.mapped(turn(Z, 90), (0.1, 0, 0)) for part in parts]
         area = sum(part.mass for part in parts)
-        yield f"shell of a {kind}", mjcf(geom.format(kind, sizes, 'density="7"')), whole(*[Solid(7 * p.mass, p.centre, 7 * p.second) for p in moved])
+        yield (
+            f"shell of a {kind}",
+            mjcf(geom.format(kind, sizes, 'density="7"')),
+            whole(*[Solid(7 * p.mass, p.centre, 7 * p.second) for p in moved]),
+        )
         scale = 2 / area
-        yield f"shell of a {kind} with a mass", mjcf(geom.format(kind, sizes, 'mass="2"')), whole(
-            *[Solid(scale * p.mass, p.centre, scale * p.second) for p in moved]
+        yield (
+            f"shell of a {kind} with a mass",
+            mjcf(geom.format(kind, sizes, 'mass="2"')),
+            whole(*[Solid(scale * p.mass, p.centre, scale * p.second) for p in moved]),
         )
     yield "shell of an ellipsoid", mjcf(geom.format("ellipsoid", "0.1 0.2 0.3", 'density="7"')), None
+
+
+def mjcf_meshes():
     corners = words(np.ravel(POINTS))
     asset = '<asset><mesh name="t" vertex="{}" {}/></asset>'
-    use = f'<geom type="mesh" mesh="t" density="500" {pos}/>'
+    use = f'<geom type="mesh" mesh="t" density="500" {POS}/>'
     tetra = tetrahedron(500)
     yield "mesh without faces", mjcf(use, head=asset.format(corners, "")), tetra.mapped(t=T)
     faces = 'face="' + " ".join(str(corner) for face in FACES for corner in face) + '" '
@@ -402,17 +474,24 @@ def mjcf_cases():
     skin = 'face="' + " ".join(str(corner) for face in squares for corner in face) + '" inertia="shell"'
     surface = [Solid(500 * p.mass, p.centre + 0.5 + T, 500 * p.second) for p in plates(1, 1, 1)]
     yield "mesh as a shell", mjcf(use, head=asset.format(words(np.ravel(CUBE)), skin)), whole(*surface)
-    other = f'<geom size="0.3" {pos} {{}}/>'
-    yield "mass 0", mjcf(brick.format(""), other.format('mass="0"')), plain.mapped(t=T)
-    yield "density 0", mjcf(brick.format(""), other.format('density="0"')), plain.mapped(t=T)
-    yield "mass before density", mjcf(brick.format('mass="3"')), plain.mapped(t=T, mass=3.0)
-    yield "group", mjcf(brick.format(""), other.format('group="4"'), head='<compiler inertiagrouprange="0 3"/>'), plain.mapped(t=T)
-    yield "total mass", mjcf(brick.format(""), head='<compiler settotalmass="3"/>'), plain.mapped(t=T, mass=3.0)
+
+
+def mjcf_options():
+    other = f'<geom size="0.3" {POS} {{}}/>'
+    yield "mass 0", mjcf(GEOM.format(""), other.format('mass="0"')), BRICK.mapped(t=T)
+    yield "density 0", mjcf(GEOM.format(""), other.format('density="0"')), BRICK.mapped(t=T)
+    yield "mass before density", mjcf(GEOM.format('mass="3"')), BRICK.mapped(t=T, mass=3.0)
+    yield (
+        "group",
+        mjcf(GEOM.format(""), other.format('group="4"'), head='<compiler inertiagrouprange="0 3"/>'),
+        BRICK.mapped(t=T),
+    )
+    yield "total mass", mjcf(GEOM.format(""), head='<compiler settotalmass="3"/>'), BRICK.mapped(t=T, mass=3.0)
     full = '<inertial mass="2" pos="0.1 -0.2 0.3" fullinertia="1 2 2.5 0.1 -0.2 0.3"/>'
     tensor = np.array([[1, 0.1, -0.2], [0.1, 2, 0.3], [-0.2, 0.3, 2.5]])
-    yield "full inertia before shapes", mjcf(full, brick.format("")), Piece(2.0, np.array(T), tensor)
-    yield "shapes before inertia", mjcf(full, brick.format(""), head='<compiler inertiafromgeom="true"/>'), plain.mapped(t=T)
-    turned = f'<inertial mass="2" {pos} quat="{words(2 * q)}" diaginertia="1 2 2.5"/>'
+    yield "full inertia before shapes", mjcf(full, GEOM.format("")), Piece(2.0, np.array(T), tensor)
+    yield "shapes before inertia", mjcf(full, GEOM.format(""), head='<compiler inertiafromgeom="true"/>'), BRICK.mapped(t=T)
+    turned = f'<inertial mass="2" {POS} quat="{words(2 * QUATERNION)}" diaginertia="1 2 2.5"/>'
     yield "inertial quaternion of norm 2", mjcf(turned), Piece(2.0, np.array(T), R @ np.diag([1, 2, 2.5]) @ R.T)
 
 
@@ -436,27 +515,38 @@ def xml_cases():
     tensor = np.array([[1, 0.1, -0.2], [0.1, 2, 0.3], [-0.2, 0.3, 2.5]])
     second = np.trace(tensor) / 2 * I3 - tensor
     part = Solid(2.0, (0, 0, 0), second)
-    R = turn(Z, 70) @ turn(Y, -50) @ turn(X, 20)
+    fixed = turn(Z, 70) @ turn(Y, -50) @ turn(X, 20)
     rpy = words(np.radians((20, -50, 70)))
     origin = f'<origin xyz="{words(T)}" rpy="{rpy}"/>'
-    turned = part.mapped(R, T)
+    turned = part.mapped(fixed, T)
     yield "rpy.urdf", urdf(origin), turned
     joint = f'<joint name="j" type="fixed"><origin xyz="1 2 3" rpy="{rpy}"/><parent link="a"/><child link="c"/></joint>'
-    yield "fixed.urdf", urdf(origin, child=joint), whole(turned, turned.mapped(R, (1, 2, 3)))
-    q = np.array(about((1, 2, -1), 40))
-    last = words(np.roll(3 * q, -1))
-    Q = turn((1, 2, -1), 40)
-    yield "quaternion of norm 3.urdf", urdf(f'<origin xyz="{words(T)}" quat_xyzw="{last}"/>', ' version="1.1"'), part.mapped(Q, T)
-    yield "half turns.urdf", urdf(f'<origin xyz="{words(T)}" rpy="{words((math.pi, 0, math.pi))}"/>'), part.mapped(np.diag([-1, 1, -1]), T)
+    yield "fixed.urdf", urdf(origin, child=joint), whole(turned, turned.mapped(fixed, (1, 2, 3)))
+    last = words(np.roll(3 * QUATERNION, -1))
+    yield (
+        "quaternion of norm 3.urdf",
+        urdf(f'<origin xyz="{words(T)}" quat_xyzw="{last}"/>', ' version="1.1"'),
+        part.mapped(R, T),
+    )
+    yield (
+        "half turns.urdf",
+        urdf(f'<origin xyz="{words(T)}" rpy="{words((math.pi, 0, math.pi))}"/>'),
+        part.mapped(np.diag([-1, 1, -1]), T),
+    )
     yield "rpy.sdf", sdf(f"<pose>{words(T)} {rpy}</pose>"), turned
     yield "degrees.sdf", sdf(f'<pose degrees="true">{words(T)} 20 -50 70</pose>'), turned
-    yield "quaternion of norm 3.sdf", sdf(f'<pose rotation_format="quat_xyzw">{words(T)} {last}</pose>'), part.mapped(Q, T)
+    yield "quaternion of norm 3.sdf", sdf(f'<pose rotation_format="quat_xyzw">{words(T)} {last}</pose>'), part.mapped(R, T)
     yield "placed.sdf", sdf(f"<pose>{words(T)} {rpy}</pose>", "<pose>4 5 6 1 2 3</pose>"), turned
 
 
 def all_cases():
     """All cases by the name of the file: the text, and the body or None."""
-    cases = {f"{name}.usda": case for name, *case in usd_cases()}
-    cases |= {f"{name}.xml": case for name, *case in mjcf_cases()}
+    of_usd = usd_turns, usd_parents, usd_mirrors, usd_values, usd_meshes
+    of_mjcf = mjcf_turns, mjcf_classes, mjcf_shapes, mjcf_shells, mjcf_meshes, mjcf_options
+    cases = {f"{name}.usda": case for made in of_usd for name, *case in made()}
+    cases |= {f"{name}.xml": case for made in of_mjcf for name, *case in made()}
     cases |= {name: case for name, *case in xml_cases()}
-    return {name.replace(" ", "_"): (text, body.piece() if isinstance(body, Solid) else body) for name, (text, body) in cases.items()}
+    return {
+        name.replace(" ", "_"): (text, body.piece() if isinstance(body, Solid) else body)
+        for name, (text, body) in cases.items()
+    }

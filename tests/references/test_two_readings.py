@@ -1,10 +1,10 @@
-"""The two readings of a model file share no function of this package, over all models of the package and over cases made here."""
+"""The two readings of a model file share no function of this package, over all models of the package."""
 
 import sys
 import types
+from contextlib import suppress
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import conservative
@@ -48,17 +48,11 @@ class Trace:
 
 def trace_both(path, kind):
     """Return the functions of the first and of the second reading of a file with one body."""
-    with Trace() as first:
-        try:
-            if kind in FIRST:
-                FIRST[kind][3](path)
-        except Refused:
-            pass
-    with Trace() as second:
-        try:
-            join_links(SECOND[kind](path, [path.parent], Reading()))
-        except (NotRead, ValueError):
-            pass
+    with Trace() as first, suppress(Refused):
+        if kind in FIRST:
+            FIRST[kind][3](path)
+    with Trace() as second, suppress(NotRead, ValueError):
+        join_links(SECOND[kind](path, [path.parent], Reading()))
     return first.functions, second.functions
 
 

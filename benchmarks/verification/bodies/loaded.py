@@ -171,15 +171,11 @@ def weigh_votes(model: Model, pairs: Sequence[tuple[Finding, LoadedBody]]) -> li
     explains it. Engines that read a format with the same parser are of one family (`loaders.FAMILIES`).
     """
 
-    def unexplained(finding: Finding, body: LoadedBody) -> bool:
+    def unexplained(finding: Finding) -> bool:
         explained = any(not cause.numbers for cause in finding.causes)
-        return finding.verdict is Verdict.WRONG and body.seen is not None and not (explained or model.flaw)
+        return finding.verdict is Verdict.WRONG and not (explained or model.flaw)
 
-    against = [
-        (finding, Piece(**{name: np.asarray(value) for name, value in body.seen.items()}))
-        for finding, body in pairs
-        if unexplained(finding, body) and body.seen
-    ]
+    against = [(finding, _piece(body.seen)) for finding, body in pairs if body.seen and unexplained(finding)]
     kinds = {finding.subject: family(finding.subject.split()[0], model.kind) for finding, _ in against}
     votes: dict[str, list[str]] = {finding.subject: [] for finding, _ in against}
     for finding, seen in against:
@@ -192,9 +188,16 @@ def weigh_votes(model: Model, pairs: Sequence[tuple[Finding, LoadedBody]]) -> li
         if not (others := votes.get(finding.subject)):
             return finding
         with_it = f"{', '.join(others)} {'has' if len(others) == 1 else 'have'} the same body, by another parser"
-        return replace(finding, verdict=Verdict.UNDECIDED, detail=f"{with_it}, and both readers have another one; {finding.detail}")
+        return replace(
+            finding, verdict=Verdict.UNDECIDED, detail=f"{with_it}, and both readers have another one; {finding.detail}"
+        )
 
     return [(revise(finding), body) for finding, body in pairs]
+
+
+def _piece(seen: dict[str, Any]) -> Piece:
+    """Return the body in the details of a finding."""
+    return Piece(seen["mass"], np.asarray(seen["com"]), np.asarray(seen["inertia"]))
 
 
 def decide_refusal(model: Model, engine: str, reason: str) -> Opinion:
