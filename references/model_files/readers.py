@@ -1,7 +1,8 @@
 """The readers of a model file: the reference reader of its format, and this package's. Both run in a worker with limits.
 
-The references are urdfdom (in Pinocchio), MuJoCo, usd-core and libsdformat (in Drake, see `verify_files`). Where both readers
-disagree about a body, no engine can be called wrong.
+The first reading is by urdfdom (in Pinocchio), MuJoCo, usd-core (`reference`) or libsdformat (in Drake, see `verify_files`). The
+second one is by this package (`description`, `mjcf`, `usd`). They share no function. Where they disagree about a body, no engine
+can be called wrong.
 """
 
 from __future__ import annotations
@@ -256,6 +257,8 @@ def _read_reference(model: Model) -> None:
         if not np.isfinite([model.reference.mass, *model.reference.inertia.flat]).all() or not model.reference.mass:
             model.reference, model.reference_refuses = None, "it finds no mass, or an inertia that is not finite"
     except MissingEngine:
+        if model.own is None:
+            raise
         model.reader = ""
     except Refused as error:
         if model.own is None or model.kind == "mjcf":

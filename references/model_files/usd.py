@@ -32,6 +32,8 @@ _SHAPES = {"cube": ("box", "size"), "sphere": ("sphere", "radius")} | {
 }
 _SKEW = 1e-5
 """Largest cosine between axes at right angles, which single precision leaves."""
+_APART = 1e-4
+"""Largest distance of the two frames of a fixed joint, relative to their distance from the origin, and of their axes."""
 
 
 class Stage:
@@ -131,8 +133,11 @@ class Stage:
     def authored(self, prim: Any) -> tuple[float | None, float | None, Array | None, Array | None]:
         """Return mass, density, centre of mass, unscaled, and inertia of a prim in SI units; None for a missing one.
 
-        A density that is not positive is not one, by OpenUSD. Nor is such a mass, if the body has colliders.
+        A density that is not positive is not one, by OpenUSD. Nor is such a mass, if the body has colliders. Without MassAPI
+        the attributes do not count.
         """
+        if not prim.HasAPI(self.physics.MassAPI):
+            return None, None, None, None
         names = ("mass", "density", "centerOfMass", "diagonalInertia", "principalAxes")
         attributes = [prim.GetAttribute(f"physics:{name}") for name in names]
         mass, density, com, moments, q = (
@@ -148,8 +153,28 @@ class Stage:
         from pxr import UsdShade
 
         bound, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial("physics")
-        value = bound.GetPrim().GetAttribute("physics:density").Get() if bound else None
-        return value and float(value) * self.kilogram / self.metre**3
+        if not bound or not bound.GetPrim().HasAPI(self.physics.MaterialAPI):
+            return None
+        value = bound.GetPrim().GetAttribute("physics:density").Get()
+        return float(value) * self.kilogram / self.metre**3 if value and value > 0 else None
+
+    def apart(self, joint: Any) -> str:
+        """Return why a fixed joint leaves the poses of its bodies open; "" if its frames coincide, as far as it has both."""
+        frames = []
+        for number in (0, 1):
+            targets = joint.GetRelationship(f"physics:body{number}").GetTargets()
+            place, q = (joint.GetAttribute(f"physics:local{name}{number}") for name in ("Pos", "Rot"))
+            prim = self.stage.GetPrimAtPath(targets[0]) if targets else None
+            if not prim or not (place.HasAuthoredValue() or q.HasAuthoredValue()):
+                return ""
+            pose, scale = self.pose(prim)
+            turn = Rotation.from_quat([*q.Get().GetImaginary(), q.Get().GetReal()]) if q.Get().GetLength() else None
+            frames.append(pose @ make_pose(scale @ (self.metre * np.array(place.Get(), float)), turn))
+        away = np.linalg.norm(frames[1][:3, 3] - frames[0][:3, 3])
+        size = max(np.linalg.norm(frame[:3, 3] - frames[0][:3, 3]) for frame in (*frames, np.eye(4))) or 1.0
+        if away < _APART * size and np.abs(frames[0][:3, :3] - frames[1][:3, :3]).max() < _APART:
+            return ""
+        return f"the frames of {joint.GetPath()} in its two bodies are apart, so that the poses of the bodies are not clear"
 
 
 def _transform(prim: Any) -> tuple[Array, bool]:
@@ -217,7 +242,7 @@ def _open_volume(stage: Stage, prim: Any) -> str:
     if any(sides[b, a] != count for (a, b), count in list(sides.items())):
         return f"{prim.GetPath()} is a mesh that is not closed, so its volume is not defined"
     approximation = prim.GetAttribute("physics:approximation")
-    wanted = (approximation.Get() if approximation else None) or "none"
+    wanted = (approximation.Get() if prim.HasAPI(stage.physics.MeshCollisionAPI) else None) or "none"
     try:
         convex = stage.form(prim, np.eye(4), 1.0).mass > ConvexHull(points).volume * (1 - 1e-6)
     except ValueError:  # it is flat
@@ -238,6 +263,7 @@ def read_usd(path: Path, search: Sequence[Path], reading: Reading) -> list[Link]
     bodies, joints = stage.bodies, stage.joints
     if not bodies or len(joints) != len(bodies) - 1 or not all(joint.IsA(stage.physics.FixedJoint) for joint in joints):
         raise refuse(path, f"{len(bodies)} rigid bodies and the joints {[joint.GetName() for joint in joints]}", ONE)
+    reading.doubts.extend(filter(None, map(stage.apart, joints)))
     return [_link(stage, body, reading) for body in bodies]
 
 

@@ -321,6 +321,31 @@ def usd_values():
         "Xform", "e", (BODY,), "bool physics:rigidBodyEnabled = 0", prim("Xform", "f", (), placed(move(2, 0, 0)), cube(DENSE))
     )
     yield "deep below a body that is off", usd(cube(DENSE, ops), deep), whole(seen, PLAIN.mapped(t=(2, 0, 0)))
+    # Attributes of schemas that the prim does not have.
+    bare = cube(mass.format(9), ops, apis=(COLLIDER,))
+    yield "mass without its schema", usd(DENSE, bare), seen
+    yield "mass of the body without its schema", usd(mass.format(9), cube(DENSE, ops), apis=(BODY,)), seen
+    bound = "rel material:binding = </b/m>"
+    for name, apis, value, rho in (
+        ("of the material", ("PhysicsMaterialAPI",), 500, 500),
+        ("-500 of the material", ("PhysicsMaterialAPI",), -500, 1000),
+        ("without the schema of the material", (), 500, 1000),
+    ):
+        material = prim("Material", "m", apis, density.format(value))
+        made = cube(bound, ops, apis=(COLLIDER, MASS, "MaterialBindingAPI"))
+        yield f"density {name}", usd(material, made), box(1, 1, 1, rho).mapped(np.diag(S), T)
+    # Two bodies on a fixed joint.
+    arm = prim("Xform", "arm", (BODY, MASS), DENSE, placed(move(2, 0, 0), ("rotateZ", "float", "90")), cube(ops))
+    ends = "rel physics:body0 = </b>\nrel physics:body1 = </arm>\npoint3f physics:localPos0 = {}"
+    turned = f"quatf physics:localRot0 = {row(about(Z, 90))}"
+    both = whole(seen, seen.mapped(turn(Z, 90), (2, 0, 0)))
+    for name, place, lines, body in (
+        ("fixed joint", "(2, 0, 0)", (turned, "point3f physics:localPos1 = (0, 0, 0)"), both),
+        ("fixed joint with frames apart", "(2, 0.1, 0)", (turned, "point3f physics:localPos1 = (0, 0, 0)"), None),
+        ("fixed joint with axes apart", "(2, 0, 0)", ("point3f physics:localPos1 = (0, 0, 0)",), None),
+    ):
+        joint = prim("PhysicsFixedJoint", "j", (), ends.format(place), *lines)
+        yield name, usd(DENSE, cube(ops), around=("", arm + joint)), body
 
 
 def usd_meshes():

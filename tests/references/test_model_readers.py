@@ -22,7 +22,7 @@ from conservative.benchmarks.verification.bodies.loaded import (
     find_warning,
 )
 from conservative.benchmarks.verification.finding import Verdict
-from conservative.errors import BadInput
+from conservative.errors import BadInput, MissingEngine
 from conservative.references.model_files import readers
 from conservative.references.model_files.pieces import Piece, distance, weigh
 from conservative.references.model_files.readers import Model, read_files, read_here
@@ -513,6 +513,21 @@ def test_with_one_reader_nothing_is_said_against_an_engine(read):
     wrong = replace(model.truth, inertia=np.eye(3))
     assert decide_body(model, "dart", wrong, 1e-4).verdict is decide_refusal(model, "dart", "no").verdict is UNDECIDED
     assert decide_body(model, "dart", model.truth, 1e-4)[:2] == (RIGHT, "")
+
+
+def test_without_mujoco_there_is_one_reading_of_mjcf(read, monkeypatch):
+    def missing(*_):
+        raise MissingEngine("MuJoCo", "pip install mujoco")
+
+    monkeypatch.setattr(readers, "version", missing)
+    box = '<freejoint/><geom type="box" size="0.1 0.2 0.3" mass="2"{}/>'
+    (model,) = read("a.xml", mjcf(box.format("")))
+    assert (model.reader, model.reference) == ("", None)
+    assert "pip install mujoco" in model.lonely
+    np.testing.assert_allclose(model.truth.inertia, 2 / 3 * np.diag([0.13, 0.1, 0.05]), rtol=1e-12)
+    assert decide_body(model, "dart", replace(model.truth, mass=9.0), 1e-4).verdict is UNDECIDED
+    with pytest.raises(MissingEngine):
+        read("b.xml", mjcf(box.format(' shellinertia="true"').replace("box", "ellipsoid")))
 
 
 def test_words_of_engines_are_about_the_body_and_keep_their_units():
