@@ -98,7 +98,7 @@ class Document:
     def joints(self, body: Any) -> list[tuple[str, Array]]:
         """Return the kinds of the joints of a body, and where they are in it (3,), m."""
         found = []
-        for joint in _within(body, "joint", "freejoint"):
+        for joint in within(body, "joint", "freejoint"):
             attributes = self.attributes(joint, self.inherited(joint)) if joint.tag == "joint" else {"type": "free"}
             place = self.frame(joint, body) @ [*numbers(attributes.get("pos", "0 0 0"), 3), 1.0]
             found.append((attributes.get("type", "hinge"), place[:3]))
@@ -193,14 +193,14 @@ def _sizes(of: Attributes, own: Attributes) -> dict[str, str]:
     return {"size": " ".join([*words, *of["size"].split()[len(words) :]])} if words and "size" in of else {}
 
 
-def _within(body: Any, *tags: str) -> list[Any]:
+def within(body: Any, *tags: str) -> list[Any]:
     """Return the elements of a body with some tags, and those in its frames."""
     found = []
     for child in body:
         if child.tag in tags:
             found.append(child)
         if child.tag == "frame":
-            found += _within(child, *tags)
+            found += within(child, *tags)
     return found
 
 
@@ -218,7 +218,7 @@ def read_mjcf(path: Path, search: Sequence[Path], reading: Reading) -> list[Link
     document = Document(path, root, search)
     if generated := next(root.iter(*_GENERATED), None):
         raise NotRead(f"<{generated.tag}>")
-    bodies = [body for world in root.findall("worldbody") for body in _within(world, "body")]
+    bodies = [body for world in root.findall("worldbody") for body in within(world, "body")]
     if len(bodies) != 1 or root.find("deformable") is not None:
         raise NotRead(f"{len(bodies)} bodies in the world, or flexible ones")
     default = document.options.get("alignfree", "false")
@@ -243,7 +243,7 @@ def _read_links(document: Document, root: Any, options: Attributes, solid: bool 
 
     def weigh_geoms(body: Any) -> Piece:
         parts = []
-        for geom in _within(body, "geom"):
+        for geom in within(body, "geom"):
             group = document.attributes(geom, document.inherited(geom)).get("group", "0")
             parts += document.weigh(geom, document.frame(geom, body), solid) if low <= number(group) <= high else []
         return join(parts)
@@ -261,7 +261,7 @@ def _read_links(document: Document, root: Any, options: Attributes, solid: bool 
             raised[:] = raised.mean()
         link = link if (raised == moments).all() else replace(link, inertia=(axes * raised) @ axes.T)
         links = [replace(link, mass=max(link.mass, number(options.get("boundmass", "0"))))]
-        for child in _within(body, "body"):
+        for child in within(body, "body"):
             links += read(child, pose @ document.frame(child, body) @ document.pose(child.attrib))
         return links
 

@@ -1,8 +1,8 @@
 """The readers of a model file: the reference reader of its format, and this package's. Both run in a worker with limits.
 
-The first reading is by urdfdom (in Pinocchio), MuJoCo, usd-core (`reference`) or libsdformat (in Drake, see `verify_files`). The
-second one is by this package (`description`, `mjcf`, `usd`). They share no function. Where they disagree about a body, no engine
-can be called wrong.
+The first reading is by urdfdom (in Pinocchio), MuJoCo, usd-core (`reference`) or libsdformat (in Drake, see `verify_files`).
+The second one is by this package (`description`, `mjcf`, `usd`). They share no function. Where they disagree about a body, no
+engine can be called wrong.
 """
 
 from __future__ import annotations

@@ -12,6 +12,7 @@ nothing of this file. A test traces both. Files are checked before (`files.guard
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Callable
 from itertools import pairwise
@@ -53,7 +54,8 @@ def by_mujoco(path: Path) -> tuple[Piece, list[str]]:
             if path.suffix == ".xml":
                 spec = mujoco.MjSpec.from_file(str(path))
             else:  # it does not take other names
-                spec = mujoco.MjSpec.from_string(path.read_text())
+                text = path.read_text()
+                spec = mujoco.MjSpec.from_string(text, include=_included(text, path.parent))
                 spec.modelfiledir = str(path.parent)
             for part in (spec.compiler, *spec.joints):  # the body keeps the axes of the file
                 for name in {"align", "alignfree"}.intersection(dir(part)):
@@ -72,6 +74,15 @@ def by_mujoco(path: Path) -> tuple[Piece, list[str]]:
     tensors = [(R * moments) @ R.T for R, moments in zip(turned, model.body_inertia[1:], strict=True)]
     part = add_up(model.body_mass[1:], (data.xipos[1:] - data.xpos[1]) @ base, tensors)
     return part, [f"MuJoCo warns: {warning.message}" for warning in caught]
+
+
+def _included(text: str, folder: Path) -> dict[str, bytes]:
+    """Return the content of the files that a text of MJCF includes, and of those that they include, by name."""
+    files: dict[str, bytes] = {}
+    for name in re.findall(r"""<include\s+file\s*=\s*["']([^"']*)["']""", text):
+        data = (folder / name).read_bytes()
+        files |= {name: data, **_included(data.decode(), folder)}
+    return files
 
 
 def add_up(masses: Any, centres: Any, tensors: Any) -> Piece:

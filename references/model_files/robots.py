@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from .description import EXTENSIONS, Description, is_true
 from .files import Unread, find, inline, parse, refuse
-from .mjcf import Document
+from .mjcf import Document, within
 
 
 @dataclass
@@ -250,10 +250,12 @@ def _mjcf(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
 
 
 def _joints_of(body: Any) -> list[Any]:
-    """Return the joints of a body of MJCF; a <freejoint> gets its type."""
-    for joint in body.findall("freejoint"):
-        joint.set("type", "free")
-    return [*body.findall("joint"), *body.findall("freejoint")]
+    """Return the joints of a body of MJCF, also in its frames; a <freejoint> gets its type."""
+    joints = within(body, "joint", "freejoint")
+    for joint in joints:
+        if joint.tag == "freejoint":
+            joint.set("type", "free")
+    return joints
 
 
 def _lighten(path: Path, made: Any, body: Any, root: Any, search: Sequence[Path]) -> None:

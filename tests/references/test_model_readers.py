@@ -515,9 +515,26 @@ def test_with_one_reader_nothing_is_said_against_an_engine(read):
     assert decide_body(model, "dart", model.truth, 1e-4)[:2] == (RIGHT, "")
 
 
+@pytest.mark.parametrize("suffix", ["xml", "mjcf"])
+def test_both_readings_follow_files_within_files(read, tmp_path, suffix):
+    """Classes, options and shapes in other files, one of which includes another; and a joint in a frame moves its body."""
+    (tmp_path / "deep.xml").write_text('<mujocoinclude><geom class="c" pos="0.1 0 0"/></mujocoinclude>')
+    (tmp_path / "part.xml").write_text('<mujocoinclude><geom class="c"/><include file="deep.xml"/></mujocoinclude>')
+    classes = '<default><default class="c"><geom type="box" size="0.1 0.2 0.3" mass="2"/></default></default>'
+    (tmp_path / "head.xml").write_text(f'<mujoco><compiler angle="radian"/>{classes}</mujoco>')
+    arm = '<body name="arm"><frame euler="0 0 1"><joint/></frame><geom class="c"/></body>'
+    alone = mjcf('<freejoint/><include file="part.xml"/>', '<include file="head.xml"/>')
+    (model,) = read(f"a.{suffix}", alone)
+    base, moved = read(f"b.{suffix}", mjcf(f'<freejoint/><include file="part.xml"/>{arm}', '<include file="head.xml"/>'))
+    for part in (model, base):
+        assert distance(part.own, part.reference) < 1e-12  # measured 2e-16
+        assert part.truth.mass == 4.0
+    assert (moved.label.endswith("arm"), moved.truth.mass, moved.body.pivots[0][0]) == (True, 2.0, "hinge")
+
+
 def test_without_mujoco_there_is_one_reading_of_mjcf(read, monkeypatch):
     def missing(*_):
-        raise MissingEngine("MuJoCo", "pip install mujoco")
+        raise MissingEngine("MuJoCo", "mujoco")
 
     monkeypatch.setattr(readers, "version", missing)
     box = '<freejoint/><geom type="box" size="0.1 0.2 0.3" mass="2"{}/>'
