@@ -141,20 +141,11 @@ def load_mesh(path: Path, name: str, search: Sequence[Path] = ()) -> tuple[Array
     return vertices, faces
 
 
-def guard(path: Path, kind: str, search: Sequence[Path] = ()) -> None:
-    """Check a file of a kind, and the files that it refers to, before readers and engines load it.
+def guard_layers(path: Path, search: Sequence[Path] = ()) -> None:
+    """Check the layers of a USD file before readers and engines open it.
 
-    Raise `BadInput` if it refers to a file that it needs outside the folders, or cannot be opened, and `MissingExtra`.
+    Raise `BadInput` if it refers to a file that is not there or outside the folders, or cannot be opened, and `MissingExtra`.
     """
-    if kind == "mjcf":
-        inline(path, search)
-    elif kind == "usd":
-        _guard_layers(path, search)
-    else:
-        parse(path)
-
-
-def _guard_layers(path: Path, search: Sequence[Path]) -> None:
     require_extra("a USD file", "models", "pxr")
     from pxr import Sdf, Tf, Usd
 

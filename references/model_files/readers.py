@@ -22,7 +22,7 @@ from ..engine import version
 from ..worker.calls import python_worker, run_within
 from ..worker.client import EngineCrashed, EngineTimeout
 from .description import read_xml
-from .files import Unread, guard, kind_of, reason, refuse
+from .files import Unread, kind_of, reason, refuse
 from .loaders import family
 from .mjcf import NotRead, read_mjcf
 from .pieces import QUANTITIES, Link, Piece, Reading, differing, distance, join, join_links, list_numbers, touched
@@ -180,7 +180,6 @@ def read_here(path: Path, label: str, folder: Path, search: Sequence[Path] = ())
     """Return the bodies of a file as `read_files`, in this process."""
     kind = kind_of(path)
     with _sentences(path):
-        guard(path, kind, search)
         bodies = split(path, kind, folder, search)
     models, refused = [], list[tuple[str, BadInput]]()
     for body in bodies:

@@ -1,7 +1,7 @@
 """The reference readings of model files: the body by the implementation of its format. SDF is read by libsdformat in Drake.
 
 Nothing here uses a function of this package outside this file, and the second readings (`description`, `mjcf`, `usd`) use
-nothing of this file. A test traces both. Files are checked before (`files.guard`).
+nothing of this file. A test traces both. The files that a model refers to are checked before (`robots.split`).
 
 * URDF: urdfdom in Pinocchio, which adds up fixed links.
 * MJCF: MuJoCo parses and compiles the file. The sum over fixed bodies is computed here.

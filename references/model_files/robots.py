@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from .description import EXTENSIONS, Description, is_true
-from .files import Unread, find, inline, parse, refuse
+from .files import Unread, find, guard_layers, inline, parse, refuse
 from .mjcf import Document, within
 
 
@@ -293,6 +293,7 @@ def _lighten(path: Path, made: Any, body: Any, root: Any, search: Sequence[Path]
 
 def _usd(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
     """Return the bodies of a USD file. In a copy all other bodies and the joints that move are not active."""
+    guard_layers(path, search)
     from pxr import Usd
 
     from .usd import Stage

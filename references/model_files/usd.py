@@ -39,7 +39,7 @@ _APART = 1e-4
 class Stage:
     """A stage with its units in m and kg, its enabled rigid bodies and its joints. Poses are in m.
 
-    Raise `BadInput` if it has no unit of length. `files.guard` opens it before.
+    Raise `BadInput` if it has no unit of length. `files.guard_layers` opens it before.
     """
 
     def __init__(self, path: Path) -> None:
