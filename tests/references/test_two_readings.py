@@ -57,7 +57,7 @@ def trace_both(path, kind):
 
 
 def test_the_two_readings_share_no_function(tmp_path):
-    """All models: 0 shared. Before, 11 functions were executed by both readings of USD, and 5 by both of MJCF."""
+    """All models: 0 shared. In 0.3.0 both readings of USD executed 13 named functions, those of MJCF 12, those of URDF none."""
     first, second = {kind: set() for kind in SECOND}, {kind: set() for kind in SECOND}
     read = 0
     for path in MODELS:
