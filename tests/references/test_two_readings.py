@@ -57,7 +57,7 @@ def trace_both(path, kind):
 
 
 def test_the_two_readings_share_no_function(tmp_path):
-    """All models: 0 shared. In 0.3.0 both readings of USD executed 13 named functions, those of MJCF 12, those of URDF none."""
+    """All models: 0 shared. Before, both of USD executed 13 named functions, both of MJCF 12, both of URDF none."""
     first, second = {kind: set() for kind in SECOND}, {kind: set() for kind in SECOND}
     read = 0
     for path in MODELS:
