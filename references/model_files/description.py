@@ -1,7 +1,7 @@
 """The rigid body of a URDF or SDF file with one body: mass, centre of mass and inertia as the formats define them.
 
-This is the second opinion, beside the reference readers in `readers`. Every element and attribute is used, known to be
-irrelevant to a free body, or named in the notes. trimesh reads meshes.
+This is the second reading, beside `reference.by_urdfdom` and libsdformat in Drake. Every element and attribute is used, known
+to be irrelevant to a free body, or named in the notes. trimesh reads meshes.
 
 References
 ----------

@@ -141,12 +141,40 @@ def load_mesh(path: Path, name: str, search: Sequence[Path] = ()) -> tuple[Array
     return vertices, faces
 
 
-def inline(path: Path, search: Sequence[Path]) -> tuple[Any, list[str]]:
+def guard_layers(path: Path, search: Sequence[Path] = ()) -> None:
+    """Check the layers of a USD file before readers and engines open it.
+
+    Raise `BadInput` if it refers to a file that is not there or outside the folders, or cannot be opened, and `MissingExtra`.
+    """
+    require_extra("a USD file", "models", "pxr")
+    from pxr import Sdf, Tf, Usd
+
+    seen = {path}
+
+    def look(place: Path) -> None:
+        layer = Sdf.Layer.FindOrOpen(str(place))
+        for name in filter(None, layer.GetCompositionAssetDependencies() if layer else []):  # none within the file
+            file = find(place, name, (path.parent, *search))
+            if file not in seen:
+                seen.add(file)
+                look(file)
+
+    try:
+        look(path)
+        Usd.Stage.Open(str(path))
+    except (Tf.ErrorException, ValueError) as error:
+        allowed = "a stage that usd-core opens, of layers in the folder of the file or in one of --search"
+        raise refuse(path, f"an error ({' '.join(str(error).split())[:200]})", allowed) from None
+
+
+def inline(path: Path, search: Sequence[Path]) -> tuple[Any, list[str], bool]:
     """Return the root of an MJCF file with the content of the files that it includes, and the names of missing files.
+
+    The last value is True if an included file is in another folder, which engines do not know.
 
     Raise `BadInput` if an included file is not there or outside the folders, and if it is included twice.
     """
-    root, seen, missing = parse(path, "mujoco"), {path.resolve()}, list[str]()
+    root, seen, missing, elsewhere = parse(path, "mujoco"), {path.resolve()}, list[str](), False
 
     def look(name: str, needed: bool) -> Path | None:
         try:
@@ -161,6 +189,7 @@ def inline(path: Path, search: Sequence[Path]) -> tuple[Any, list[str]]:
         raise refuse(path, "a namespace, which MJCF does not have", "a file of MJCF without xmlns")
     while (element := next(root.iter("include"), None)) is not None:
         place = look(element.get("file", ""), True) or path
+        elsewhere |= place != path.parent / element.get("file", "")
         if place.resolve() in seen:
             raise refuse(path, "files that include each other, or one twice", "each file included once")
         seen.add(place.resolve())
@@ -172,4 +201,4 @@ def inline(path: Path, search: Sequence[Path]) -> tuple[Any, list[str]]:
         folder = folders.get({"texture": "texturedir"}.get(element.tag, "meshdir"), folders.get("assetdir", ""))
         for name in [value for key, value in element.attrib.items() if key.startswith("file")]:
             look(f"{folder}/{name}" if folder else name, element.tag == "model")
-    return root, missing
+    return root, missing, elsewhere

@@ -300,3 +300,19 @@ def _newton(path, kind):
 _ALL = _mujoco, _pinocchio, _drake, _dart, _pybullet, _newton, _sapien, _brax, _mjx, _mjwarp
 LOADERS = {loader.__name__[1:]: loader for loader in _ALL}
 """Loaders by the names of engines."""
+
+FAMILIES: dict[str, dict[str, tuple[str, ...]]] = {
+    "urdf": {
+        "urdfdom": ("pinocchio", "dart"),
+        "MuJoCo": ("mujoco", "mujoco_js", "mjx", "mjwarp"),
+    },
+    "mjcf": {"MuJoCo": ("mujoco", "mujoco_js", "mjx", "mjwarp", "brax")},
+    "sdf": {"libsdformat": ("drake", "pinocchio")},
+    "usd": {"usd-core": ("newton",)},
+}
+"""Engines that read a format with the same parser, by format and parser. All other engines have a parser of their own."""
+
+
+def family(engine: str, kind: str) -> str:
+    """Return the name of the parser with which an engine reads files of a kind."""
+    return next((name for name, engines in FAMILIES.get(kind, {}).items() if engine in engines), engine)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from typing import Any
@@ -77,6 +77,7 @@ class Link:
 
     `pose` (4, 4) is the pose of the link in the root link, and `frame` (4, 4) the pose of the inertial frame in the link, m.
     `inertia` (3, 3) is in the inertial frame, kg m^2, with a `rounding` as in `Piece`. `geometry` has the density `DENSITY`.
+    `without` has the part in the axes of the link by the options of the file that a loader may ignore.
     """
 
     pose: Array
@@ -86,6 +87,7 @@ class Link:
     geometry: Piece = Piece(0.0, np.zeros(3), np.zeros((3, 3)))
     name: str = ""
     rounding: float = 0.0
+    without: Mapping[str, Piece] = field(default_factory=dict)
 
     @property
     def part(self) -> Piece:

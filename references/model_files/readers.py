@@ -1,12 +1,13 @@
 """The readers of a model file: the reference reader of its format, and this package's. Both run in a worker with limits.
 
-The references are urdfdom (in Pinocchio), MuJoCo, usd-core and libsdformat (in Drake, see `verify_files`). Where both readers
-disagree about a body, no engine can be called wrong.
+The first reading is by urdfdom (in Pinocchio), MuJoCo, usd-core (`reference`) or libsdformat (in Drake, see `verify_files`).
+The second one is by this package (`description`, `mjcf`, `usd`). They share no function. Where they disagree about a body, no
+engine can be called wrong.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -17,15 +18,17 @@ import numpy as np
 
 from conservative.errors import BadInput, MissingEngine, MissingExtra
 
-from ..engine import load, version
+from ..engine import version
 from ..worker.calls import python_worker, run_within
 from ..worker.client import EngineCrashed, EngineTimeout
 from .description import read_xml
 from .files import Unread, kind_of, reason, refuse
-from .mjcf import NotRead, compile_mjcf, read_mjcf
+from .loaders import family
+from .mjcf import NotRead, read_mjcf
 from .pieces import QUANTITIES, Link, Piece, Reading, differing, distance, join, join_links, list_numbers, touched
+from .reference import Refused, by_mujoco, by_urdfdom, by_usd_core
 from .robots import Body, split
-from .usd import read_usd, reference_usd
+from .usd import read_usd
 
 SECONDS = 60.0
 """Time in seconds that reading a file may take."""
@@ -33,12 +36,21 @@ MEMORY = 2 * 2**30
 """Memory in bytes that reading a file may take, including the engine, where the system supports a limit."""
 AGREE = 1e-4
 """Largest relative distance of two readings of one body. usd-core has single precision: measured 1.6e-7."""
-FAMILY = {
-    "urdf": ("pinocchio",),
-    "mjcf": ("mujoco", "mujoco_js", "mjx", "mjwarp"),
-    "sdf": ("drake",),
+REFERENCE = {"urdf": "urdfdom", "mjcf": "MuJoCo", "sdf": "libsdformat", "usd": "usd-core"}
+"""Parsers of the reference readers, as in `loaders.FAMILIES`."""
+FIRST: dict[str, tuple[str, str, str, Callable[[Path], tuple[Piece, list[str]]]]] = {
+    "urdf": ("urdfdom in Pinocchio", "pin", "Pinocchio", by_urdfdom),
+    "mjcf": ("MuJoCo", "mujoco", "MuJoCo", by_mujoco),
+    "usd": ("usd-core", "usd-core", "usd-core", by_usd_core),
 }
-"""Engines that read a format with its reference reader."""
+"""The reference reading of a format: its name, the package and the usual name of the implementation, and the function."""
+SECOND: dict[str, Callable[[Path, Sequence[Path], Reading], list[Link]]] = {
+    "urdf": read_xml,
+    "sdf": read_xml,
+    "mjcf": read_mjcf,
+    "usd": read_usd,
+}
+"""The reading of a format by this package. It shares no function of this package with the first one."""
 OWN = "this package"
 DIGITS = "the digits of the file leave open if a body is like this"
 
@@ -101,13 +113,15 @@ class Model(Reading):
     def lonely(self) -> str:
         """Reason that there is one reader only; "" if there are two."""
         if self.own and not self.reader:
-            how = {"sdf": "conservative engines install drake"}.get(self.kind, "pip install pin")
+            package = FIRST[self.kind][1] if self.kind in FIRST else ""
+            how = f"pip install {package}" if package else "conservative engines install drake"
             return f"no reference reader is installed ({how})"
         return "" if self.own else f"{OWN} does not read the file ({self.own_refuses})"
 
     def _asks(self, engine: str) -> dict[str, str]:
         """Return the options of the file for an engine that change this body."""
-        asked = {key: text for name, asks in self.asks.items() if engine in _family(name) for key, text in asks.items()}
+        same = family(engine, self.kind)  # `mujoco` stands for all engines that read with MuJoCo
+        asked = {key: text for name, asks in self.asks.items() if same == family(name, self.kind) for key, text in asks.items()}
         possible = not self.truth.flaw and not self.bad
         return {key: text for key, text in asked.items() if not (possible and key == "balanceinertia")}
 
@@ -120,7 +134,7 @@ class Model(Reading):
 
     def alone(self, engine: str) -> bool:
         """Return True if an engine would be compared with itself."""
-        return self.own is None and engine in FAMILY.get(self.kind, ())
+        return self.own is None and family(engine, self.kind) == REFERENCE[self.kind]
 
     def asked_for(self, engine: str, seen: Piece, tolerance: float) -> str:
         """Return the options of the file for an engine if they explain the body that it has."""
@@ -139,10 +153,6 @@ class Model(Reading):
             for name, part in parts.items()
             if name and part
         }
-
-
-def _family(name: str) -> tuple[str, ...]:
-    return FAMILY["mjcf"] if name == "mujoco" else (name,)
 
 
 def read_files(paths: Sequence[Path], folder: Path, search: Sequence[Path] = ()) -> list[Model]:
@@ -205,17 +215,12 @@ def _sentences(path: Path) -> Iterator[None]:
 def _read(model: Model, search: Sequence[Path]) -> None:
     """Fill a model with the results of both readers for its body. Raise `BadInput` if it cannot be read."""
     path, kind = model.path, model.kind
-    references = {
-        "urdf": ("urdfdom in Pinocchio", "pin", "Pinocchio", partial(_urdfdom, path)),
-        "mjcf": ("MuJoCo", "mujoco", "MuJoCo", partial(compile_mjcf, path, search, model)),
-        "usd": ("usd-core", "usd-core", "usd-core", partial(reference_usd, path, search)),
-    }
     try:
-        model.links = {"usd": read_usd, "mjcf": read_mjcf}.get(kind, read_xml)(path, search, model)
+        model.links = SECOND[kind](path, search, model)
     except NotRead as error:
         model.own_refuses = f"there is no rule here for {error}"
     except Exception as error:
-        if kind != "mjcf" or isinstance(error, MissingEngine):  # only MuJoCo defines MJCF
+        if kind != "mjcf":  # only MuJoCo defines MJCF
             raise
         model.own_refuses = reason(error) if isinstance(error, BadInput) else f"{type(error).__name__}"
     finite = [number for link in model.links for number in (link.mass, *link.inertia.flat, *link.frame.flat, *link.pose.flat)]
@@ -227,19 +232,8 @@ def _read(model: Model, search: Sequence[Path]) -> None:
         base = np.linalg.inv(model.links[0].pose)
         model.links = [replace(link, pose=base @ link.pose) for link in model.links]
         model.own = join_links(model.links)
-    if kind in references:
-        name, package, engine, read = references[kind]
-        try:
-            model.reader = f"{name} {version(package, engine)}"
-            model.reference = read()
-            if not np.isfinite([model.reference.mass, *model.reference.inertia.flat]).all() or not model.reference.mass:
-                model.reference, model.reference_refuses = None, "it finds no mass, or an inertia that is not finite"
-        except MissingEngine:
-            model.reader = ""
-        except BadInput as error:
-            if model.own is None or kind == "mjcf":
-                raise
-            model.reference_refuses = reason(error)
+    if kind in FIRST:
+        _read_reference(model)
     truth = model.truth
     model.links = model.links or [Link(np.eye(4)).filled(truth)]
     if model.flaw or truth.excess:
@@ -252,16 +246,20 @@ def _read(model: Model, search: Sequence[Path]) -> None:
     model.notes = list(dict.fromkeys([*model.notes, *model.invalid, *model.bad, *model.doubts, *asks]))
 
 
-def _urdfdom(path: Path) -> Piece:
-    """Return the body of a URDF file with one body, as urdfdom reads it in Pinocchio."""
-    pin = load("pinocchio", "pin", "Pinocchio")
+def _read_reference(model: Model) -> None:
+    """Add the body by the reference reader of the format. Raise `BadInput` if neither reader has one, and for MJCF."""
+    name, package, engine, read = FIRST[model.kind]
     try:
-        model = pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer())
-    except ValueError as error:
-        raise refuse(path, f"an error ({' '.join(str(error).split())})", "a URDF file that Pinocchio reads") from None
-    bodies = [
-        Piece(inertia.mass, np.array(inertia.lever), np.array(inertia.inertia)) for inertia in model.inertias if inertia.mass
-    ]
-    if len(bodies) != 1:
-        raise refuse(path, f"{len(bodies)} bodies that have a mass", "one body")
-    return bodies[0]
+        model.reader = f"{name} {version(package, engine)}"
+        model.reference, warned = read(model.path)
+        model.notes += warned
+        if not np.isfinite([model.reference.mass, *model.reference.inertia.flat]).all() or not model.reference.mass:
+            model.reference, model.reference_refuses = None, "it finds no mass, or an inertia that is not finite"
+    except MissingEngine:
+        if model.own is None:
+            raise
+        model.reader = ""
+    except Refused as error:
+        if model.own is None or model.kind == "mjcf":
+            raise refuse(model.path, str(error), f"a file that {engine} reads") from None
+        model.reference_refuses = str(error)

@@ -15,8 +15,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from .description import EXTENSIONS, Description, is_true
-from .files import Unread, find, inline, parse, refuse
-from .mjcf import parse_mjcf
+from .files import Unread, find, guard_layers, inline, parse, refuse
+from .mjcf import Document, within
 
 
 @dataclass
@@ -202,8 +202,8 @@ def _place_for(folder: Path, path: Path, suffix: str) -> Path:
 
 def _mjcf(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
     """Return the bodies of an MJCF file: bodies in the world, and bodies on joints."""
-    root, missing = inline(path, search)
-    spec, entries = parse_mjcf(path, search)[1], list[tuple[Any, str]]()
+    root, missing, elsewhere = inline(path, search)
+    document, entries = Document(path, root, search), list[tuple[Any, str]]()
 
     def walk(element: Any, inherited: str, world: bool) -> None:
         inherited = element.get("childclass", inherited)
@@ -220,15 +220,14 @@ def _mjcf(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
     free = all(
         len(_joints_of(body)) <= 1 and all(joint.get("type") == "free" for joint in _joints_of(body)) for body, _ in entries
     )
-    alone = len(entries) == 1 and free and bool(_joints_of(entries[0][0])) and not missing
+    alone = len(entries) == 1 and free and bool(_joints_of(entries[0][0])) and not (missing or elsewhere)
     notes = [f"engines get a copy without {name!r}, which is not in the file's folder or a search path" for name in missing[:1]]
     for compiler in root.findall("compiler") * (not alone):
         if float(compiler.attrib.pop("settotalmass", "-1")) > 0:
             notes.append("settotalmass is left out: masses are those before they are scaled")
     bodies: Bodies = []
     for number, (body, inherited) in enumerate(entries):
-        joints = spec.body(body.get("name")).joints if body.get("name") else ()
-        pivots = [(joint.type.name.removeprefix("mjJNT_").lower(), np.array(joint.pos)) for joint in joints]
+        pivots = document.joints(body)
         name, copy = body.get("name") or f"body {number}", deepcopy(body)
         copy.attrib.update({"name": name} | ({"childclass": inherited} if inherited != "main" else {}))
         for key in ("pos", "quat", "axisangle", "euler", "xyaxes", "zaxis", "mocap"):
@@ -251,10 +250,12 @@ def _mjcf(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
 
 
 def _joints_of(body: Any) -> list[Any]:
-    """Return the joints of a body of MJCF; a <freejoint> gets its type."""
-    for joint in body.findall("freejoint"):
-        joint.set("type", "free")
-    return [*body.findall("joint"), *body.findall("freejoint")]
+    """Return the joints of a body of MJCF, also in its frames; a <freejoint> gets its type."""
+    joints = within(body, "joint", "freejoint")
+    for joint in joints:
+        if joint.tag == "freejoint":
+            joint.set("type", "free")
+    return joints
 
 
 def _lighten(path: Path, made: Any, body: Any, root: Any, search: Sequence[Path]) -> None:
@@ -292,11 +293,12 @@ def _lighten(path: Path, made: Any, body: Any, root: Any, search: Sequence[Path]
 
 def _usd(path: Path, folder: Path, search: Sequence[Path]) -> Bodies:
     """Return the bodies of a USD file. In a copy all other bodies and the joints that move are not active."""
+    guard_layers(path, search)
     from pxr import Usd
 
     from .usd import Stage
 
-    stage = Stage(path, search)
+    stage = Stage(path)
     names, parents, physics = [str(body.GetPath()) for body in stage.bodies], dict[str, str](), stage.physics
     pivots: dict[str, list[tuple[str, Any]]] = {name: [] for name in names}
     for joint in stage.joints:

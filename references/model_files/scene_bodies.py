@@ -48,8 +48,8 @@ def body_from_file(path: str | PathLike[str], name: str, kind: str) -> MassDistr
     BadInput
         The file is of another kind or cannot be read, has no such body, its readers disagree about it, no body has its mass and
         inertia, or its joints do not let it turn about a point.
-    MissingEngine, MissingExtra
-        MuJoCo, lxml, trimesh or usd-core is not installed.
+    MissingExtra
+        lxml, trimesh or usd-core is not installed.
     """
     try:
         text = os.fsdecode(path)

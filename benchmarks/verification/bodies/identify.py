@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from conservative.attitude import Array, hat
-from conservative.references.model_files.pieces import Piece, list_numbers, steiner
+from conservative.references.model_files.pieces import Piece, list_numbers
 
 CASES = 24
 RATE = 3.0
@@ -55,7 +55,7 @@ def identify(cases: Array, measured: Array, near: Piece) -> Piece:
         right.append(np.concatenate([force / units[1], (torque - np.cross(P, force)) / units[2]]))
     x = np.linalg.lstsq(np.vstack(rows), np.concatenate(right), rcond=None)[0]
     mass, d = x[0] * units[0], x[1:4] / x[0] * size
-    inertia = x[4:].reshape(3, 3) * units[2] - steiner(mass, d)
+    inertia = x[4:].reshape(3, 3) * units[2] + mass * hat(d) @ hat(d)  # J_P = J - m [d]x [d]x
     return Piece(float(mass), near.com + d, inertia)
 
 

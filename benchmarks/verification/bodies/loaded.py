@@ -24,7 +24,7 @@ from conservative.programs import list_programs
 from conservative.references.engine import version
 from conservative.references.environments.environment import find_environment, list_environments
 from conservative.references.model_files import loaders
-from conservative.references.model_files.loaders import LOADERS
+from conservative.references.model_files.loaders import LOADERS, family
 from conservative.references.model_files.pieces import QUANTITIES, Piece, differing, distance, errors
 from conservative.references.model_files.readers import DIGITS, Model, read_files
 from conservative.references.worker.calls import python_worker
@@ -146,6 +146,7 @@ def verify_files(
             for done, model in enumerate(models):
                 tell((number + done / len(models)) / len(programs), f"{program.label}: {model.label}")
                 loaded[model.label].append(program.check(model))
+        loaded = {model.label: weigh_votes(model, loaded[model.label]) for model in models}
     return [_join(file, list(same), loaded) for file, same in groupby(models, key=lambda model: model.file)]
 
 
@@ -161,6 +162,42 @@ def _join(file: str, models: list[Model], loaded: dict[str, list[tuple[Finding, 
     reason += f"; wrong in {', '.join(wrong)}" * bool(wrong)
     details = tuple(body for _, body in pairs)
     return Verification(file, "model file", tuple(findings), reason, tuple(dict.fromkeys(notes)), details)
+
+
+def weigh_votes(model: Model, pairs: Sequence[tuple[Finding, LoadedBody]]) -> list[tuple[Finding, LoadedBody]]:
+    """Return findings and details for a body, undecided instead of wrong where engines of different families agree.
+
+    They agree if they have the same body within the tolerance of the less exact one, and no known mistake without a number
+    explains it. Engines that read a format with the same parser are of one family (`loaders.FAMILIES`).
+    """
+
+    def unexplained(finding: Finding) -> bool:
+        explained = any(not cause.numbers for cause in finding.causes)
+        return finding.verdict is Verdict.WRONG and not (explained or model.flaw)
+
+    against = [(finding, _piece(body.seen)) for finding, body in pairs if body.seen and unexplained(finding)]
+    kinds = {finding.subject: family(finding.subject.split()[0], model.kind) for finding, _ in against}
+    votes: dict[str, list[str]] = {finding.subject: [] for finding, _ in against}
+    for finding, seen in against:
+        for other, its in against:
+            same = distance(seen, its) < max(finding.allowed, other.allowed)
+            if same and kinds[finding.subject] != kinds[other.subject]:
+                votes[finding.subject].append(other.subject)
+
+    def revise(finding: Finding) -> Finding:
+        if not (others := votes.get(finding.subject)):
+            return finding
+        with_it = f"{', '.join(others)} {'has' if len(others) == 1 else 'have'} the same body, by another parser"
+        return replace(
+            finding, verdict=Verdict.UNDECIDED, detail=f"{with_it}, and both readers have another one; {finding.detail}"
+        )
+
+    return [(revise(finding), body) for finding, body in pairs]
+
+
+def _piece(seen: dict[str, Any]) -> Piece:
+    """Return the body in the details of a finding."""
+    return Piece(seen["mass"], np.asarray(seen["com"]), np.asarray(seen["inertia"]))
 
 
 def decide_refusal(model: Model, engine: str, reason: str) -> Opinion:

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from conservative.attitude import Array
+from conservative.references.model_files.mjcf import OPTIONS
 from conservative.references.model_files.pieces import Link, Piece, join_links, make_pose, steiner
 
 from .mistake import Mistake, Number
@@ -98,6 +99,11 @@ def _other_angles(factor: float) -> Callable[[Links], Links]:
     return _all(lambda k: {"frame": turn(k.frame), "pose": turn(k.pose)})
 
 
+def _without(links: Links, option: str) -> Links:
+    """Return the links that follow without an option of the file."""
+    return [link.filled(link.without[option]) if option in link.without else link for link in links]
+
+
 def _of_scenes(key: str, change: Callable[[Links], Links]) -> BodyMistake:
     """Return a mistake that scenes have as well, with its effect on links."""
     return BodyMistake(key, next(scene.sentence for scene in SCENES if scene.key == key), change)
@@ -144,6 +150,10 @@ LOADED: tuple[BodyMistake, ...] = (
         "mass of the geometry",
         "Mass and inertia are computed from the geometry at 1000 kg/m^3",
         _all(lambda k: _from_geometry(k, k.geometry.mass, True)),
+    ),
+    *(
+        BodyMistake(f"{option} ignored", f"`{option}` is ignored", partial(_without, option=option))
+        for option in (*OPTIONS, "shellinertia")
     ),
     BodyMistake("inertia about the origin", "The inertia is taken about the origin of the link", _all(lambda k: _moved(k, -1))),
     BodyMistake("inertia moved twice", "The inertia is moved away from the centre of mass", _all(lambda k: _moved(k, 1))),

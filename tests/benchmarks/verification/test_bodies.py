@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import shlex
 import shutil
 import sys
@@ -19,7 +20,7 @@ from conservative.benchmarks.verification.bodies import loaded, verify_files
 from conservative.benchmarks.verification.bodies.explain import find_causes
 from conservative.benchmarks.verification.bodies.identify import accelerations, identify, make_cases
 from conservative.benchmarks.verification.bodies.loaded import CATALOGUE, decide_refusal
-from conservative.benchmarks.verification.finding import EXIT_CODES, Verdict
+from conservative.benchmarks.verification.finding import EXIT_CODES, Finding, Verdict
 from conservative.benchmarks.verification.mistakes import BY_KEY
 from conservative.benchmarks.verification.mistakes.bodies import FITTED, LOADED
 from conservative.errors import BadInput, MissingEngine
@@ -36,7 +37,7 @@ GENERIC = CATALOGUE / "chain_of_fixed_children.urdf"
 TRAPS = sorted(path for path in CATALOGUE.iterdir() if path.suffix not in (".obj", ".md"))
 
 
-RIGHT, WRONG, NOT_TESTED = Verdict.RIGHT, Verdict.WRONG, Verdict.NOT_TESTED
+RIGHT, WRONG, UNDECIDED, NOT_TESTED = Verdict.RIGHT, Verdict.WRONG, Verdict.UNDECIDED, Verdict.NOT_TESTED
 
 
 def findings(files, *engines):
@@ -156,6 +157,9 @@ def test_a_loader_with_a_mistake_is_named(mistake):
     links = read_links(path)
     inertia = join_links(read_links(CATALOGUE / "products_of_inertia.urdf")).inertia
     links = [replace(link, inertia=inertia) for link in links]
+    if mistake.key.endswith(" ignored"):  # an option of the file that changes the root link
+        other = {mistake.key.removesuffix(" ignored"): Piece(3.0, np.array([0.1, 0, 0]), np.diag([0.5, 0.6, 0.7]))}
+        links = [replace(links[0], without=other), *links[1:]]
     wanted, made = join_links(links), join_links(mistake.change(links))
     cases = make_cases(wanted)
     seen = identify(cases, accelerations(made, cases), wanted)
@@ -201,6 +205,64 @@ def test_the_error_of_an_engine_is_relative_to_the_inertia_that_it_has():
     wanted = join_links(links)
     (cause,) = find_causes(links, replace(wanted, inertia=1e-6 * np.eye(3) + wanted.inertia), 1e-2)
     assert cause.keys == ("moments raised",)
+
+
+@pytest.mark.parametrize(("option", "file"), [("inertiagrouprange", "group_of_shapes"), ("settotalmass", "total_mass")])
+def test_an_option_that_is_ignored_is_named(option, file, tmp_path):
+    """The bodies of the catalogue without the option, by the first reading of the same file without it."""
+    path, plain = CATALOGUE / f"{file}.xml", tmp_path / "plain.xml"
+    plain.write_text(re.sub(rf'{option}="[^"]*"', "", path.read_text()))
+    (cause,) = find_causes(read_links(path), model_of(plain).reference, 1e-6)
+    assert cause.sentence == f"`{option}` is ignored"
+    assert cause.left < 1e-12  # measured 5e-16
+
+
+def made_findings(model, **seen):
+    """Findings and details of engines that have bodies."""
+    pairs = []
+    for name, part in seen.items():
+        opinion = loaded.decide_body(model, name, part, 1e-4)
+        finding = Finding(f"{name} 1", "bodies", model.label, opinion.verdict, allowed=1e-4, causes=opinion.causes)
+        body = {key: np.asarray(value).tolist() for key, value in vars(part).items()}
+        pairs.append((finding, loaded.LoadedBody(finding.subject, model.label, {}, model.flaw, body)))
+    return [finding for finding, _ in loaded.weigh_votes(model, pairs)]
+
+
+def test_two_engines_of_different_families_that_agree_against_both_readers_are_undecided():
+    model = model_of(CATALOGUE / "products_of_inertia.urdf")
+    other = replace(model.truth, inertia=model.truth.inertia + 0.01 * np.diag([1, 2, 2.5]), mass=3.0)
+    third = replace(other, mass=4.0)
+
+    def verdicts(**seen):
+        return [finding.verdict for finding in made_findings(model, **seen)]
+
+    assert verdicts(drake=other) == [WRONG]
+    assert verdicts(drake=other, pybullet=other) == [UNDECIDED, UNDECIDED]
+    assert "pybullet 1 has the same body" in made_findings(model, drake=other, pybullet=other)[0].detail
+    assert verdicts(drake=other, pybullet=third) == [WRONG, WRONG]
+    assert verdicts(drake=other, pybullet=model.truth) == [WRONG, RIGHT]
+    for same in (("pinocchio", "dart"), ("mujoco", "mjwarp"), ("mujoco", "mujoco_js")):  # the same parser of URDF
+        assert verdicts(**dict.fromkeys(same, other)) == [WRONG, WRONG]
+    assert verdicts(drake=other, pinocchio=other, dart=third) == [UNDECIDED, UNDECIDED, WRONG]
+    # A known mistake explains both, so that it is the mistake of both.
+    ignored = replace(model.truth, inertia=np.diag(np.diag(model.truth.inertia)))
+    assert verdicts(drake=ignored, pybullet=ignored) == [WRONG, WRONG]
+    # Numbers can be fitted to anything.
+    double = replace(model.truth, mass=2 * model.truth.mass, inertia=2 * model.truth.inertia)
+    assert verdicts(drake=double, pybullet=double) == [UNDECIDED, UNDECIDED]
+
+
+def test_a_flaw_of_the_file_is_no_matter_of_votes():
+    model = model_of(CATALOGUE / "triangle_inequality.urdf")
+    assert [finding.verdict for finding in made_findings(model, drake=model.truth, pybullet=model.truth)] == [WRONG, WRONG]
+
+
+def test_families_are_of_known_engines_and_disjoint():
+    for kind, families in loaders.FAMILIES.items():
+        engines = [engine for names in families.values() for engine in names]
+        assert len(engines) == len(set(engines)), kind
+        assert set(engines) <= {*loaders.LOADERS, *loaded.OTHERS}
+    assert set(loaders.FAMILIES) == {"urdf", "mjcf", "sdf", "usd"}
 
 
 def test_mistakes_of_loaders_are_in_the_table_of_all():
