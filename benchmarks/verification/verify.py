@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -43,7 +44,7 @@ CHECKS_OF: dict[Kind, tuple[str, ...]] = {
     Kind.METHOD: ("motions", "order", "repeatability", "pairs"),
     Kind.ENGINE: ("motions", "order", "repeatability", "pairs"),
     Kind.PROGRAM: ("protocol", "motions", "order", "repeatability", "pairs", "times"),
-    Kind.MODEL: ("bodies",),
+    Kind.MODEL: ("links", "bodies"),
 }
 """Checks of each kind of subject, in their order."""
 MODELS = (".urdf", ".sdf", ".mjcf", ".xml", ".usd", ".usda", ".usdc", ".usdz")
@@ -95,13 +96,41 @@ def _words(text: str) -> list[str]:
         return [text]
 
 
+LAYERS = (".usd", ".usda", ".usdc", ".usdz")
+"""Suffixes of files that may be parts of other files, so that a library is not searched for them."""
+
+
+def models_below(folder: Path) -> Iterator[Path]:
+    """Yield the model files of XML in the folders below a folder, by name; other XML and parts of models are left out."""
+    for path in sorted(folder.rglob("*")):
+        if path.is_file() and path.suffix.lower() in set(MODELS) - set(LAYERS) and is_model(path):
+            yield path
+
+
+def is_model(path: Path) -> bool:
+    """Return True if a file of XML is a whole model: a robot, a world or model of SDF, or MJCF with a world."""
+    try:
+        text = path.read_bytes()
+    except OSError:
+        return False
+    root = re.search(rb"<(\w+)", re.sub(rb"<!--.*?-->", b"", text, flags=re.DOTALL))
+    name = root[1] if root else b""
+    whole = {b"robot": b"<link", b"sdf": b"<link", b"mujoco": b"<worldbody"}
+    return name in whole and whole[name] in text and b"<xacro:" not in text
+
+
 def expand(texts: Sequence[str]) -> list[Subject]:
-    """Return the subjects of texts; a folder stands for its recordings and model files, by name. Raise `BadInput`."""
+    """Return the subjects of texts. Raise `BadInput`.
+
+    A folder stands for its recordings and model files, by name. Without any, it is a library and stands for the model files in
+    the folders below it.
+    """
     subjects = []
     for text in texts:
         if (folder := Path(text)).is_dir():
             endings = (*ENDINGS, *MODELS)
             files = sorted(path for path in folder.iterdir() if path.is_file() and path.name.lower().endswith(endings))
+            files = files or list(models_below(folder))
             if not files:
                 raise BadInput("subject", f"the folder {text!r}", f"a folder with files that end in {', '.join(endings)}")
             subjects += [Subject(str(path), kind_of(str(path)), path, in_folder=True) for path in files]
@@ -135,7 +164,7 @@ def verify(
     body
         Scene, its name or its file, for recordings.
     engines
-        Engines that load model files; by default those that are installed.
+        Engines that load model files; by default those that are installed. Without one, only the links of the files are checked.
     only
         Names of checks, see `finding.CHECKS`; by default all that fit a subject.
     pairs
@@ -183,13 +212,17 @@ def verify(
     if unused := set(only) - {check for kind in kinds for check in CHECKS_OF[kind]}:
         allowed = ", ".join(dict.fromkeys(check for kind in kinds for check in CHECKS_OF[kind]))
         raise BadInput("only", repr(sorted(unused)[0]), f"checks of {' and '.join(sorted(kinds))}: {allowed}")
+    if engines and only and "bodies" not in only:
+        raise BadInput("engines", f"{', '.join(engines)!r} without the check of bodies", "bodies in --only, or no --only")
     if pairs and only and "pairs" not in only:
         raise BadInput("pairs", f"{', '.join(pairs)!r} without the check of pairs", "pairs in --only, or no --only")
     results: list[Verification] = []
     if files := [subject.path for subject in expanded if subject.kind is Kind.MODEL and subject.path]:
-        from .bodies import verify_files
+        from .bodies import verify_models
 
-        results += verify_files(files, engines, tell, search)
+        checks = [check for check in CHECKS_OF[Kind.MODEL] if not only or check in only]
+        libraries = [Path(os.fspath(text)) for text in listed if isinstance(text, str | os.PathLike) and Path(text).is_dir()]
+        results += verify_models(files, checks, engines, tell, [*search, *libraries])
     recordings = [subject for subject in expanded if subject.kind is Kind.RECORDING]
     if tables := [recording.path for recording in recordings if recording.path]:
         together = len(tables) == 2 and not any(recording.in_folder for recording in recordings)

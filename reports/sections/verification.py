@@ -14,6 +14,7 @@ from conservative.benchmarks.verification.finding import EXIT_CODES, Cause, Find
 from ..document.cells import DASH, bound, listed
 from ..document.model import Block, Cell, Check, Document, Emphasis, Grade, Item, Items, Paragraph, Row, Section, Table, filled
 from .bodies import body_blocks
+from .links import link_blocks
 from .recording import described, recording_blocks, two_blocks
 
 Key = TypeVar("Key")
@@ -63,9 +64,9 @@ def build(verifications: Sequence[Verification], made: Mapping[str, str] | None 
     before = described(order[0]) if len(order) == 1 and order[0].kind == "recording" else []
     lead = filled(*before, Paragraph(_sentence(order), Emphasis.LEAD), Items(sentences) if len(order) > 1 else None)
 
-    def blocks(make: Callable[[Verification], list[Block]], shown: Sequence[Verification]) -> list[Block]:
+    def blocks(make: Callable[[Verification], list[Block]], shown: Sequence[Verification], brief: bool) -> list[Block]:
         parts = [
-            *([("Model files", body_blocks(models))] if models else []),
+            *([("Model files", [*link_blocks(models, brief), *body_blocks(models)])] if models else []),
             *((verification.subject, make(verification)) for verification in shown),
         ]
         return [*lead, *(parts[0][1] if len(order) == 1 or not others else filled(*(Section(*part) for part in parts)))]
@@ -73,8 +74,8 @@ def build(verifications: Sequence[Verification], made: Mapping[str, str] | None 
     return Document(
         "conservative verify",
         f"Verified: {', '.join(verification.subject for verification in verifications)}",
-        [*blocks(details, others), Paragraph(TERMS, Emphasis.NOTE)],
-        brief=blocks(summary, [other for other in others if len(order) == 1 or other.verdict is not Verdict.RIGHT]),
+        [*blocks(details, others, False), Paragraph(TERMS, Emphasis.NOTE)],
+        brief=blocks(summary, [other for other in others if len(order) == 1 or other.verdict is not Verdict.RIGHT], True),
         data={
             "verified": [verification.subject for verification in verifications],
             "verdict": order[0].verdict,
