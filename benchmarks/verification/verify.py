@@ -221,8 +221,7 @@ def verify(
         from .bodies import verify_models
 
         checks = [check for check in CHECKS_OF[Kind.MODEL] if not only or check in only]
-        libraries = [Path(os.fspath(text)) for text in listed if isinstance(text, str | os.PathLike) and Path(text).is_dir()]
-        results += verify_models(files, checks, engines, tell, [*search, *libraries])
+        results += verify_models(files, checks, engines, tell, [*search, *_packages(listed)])
     recordings = [subject for subject in expanded if subject.kind is Kind.RECORDING]
     if tables := [recording.path for recording in recordings if recording.path]:
         together = len(tables) == 2 and not any(recording.in_folder for recording in recordings)
@@ -235,6 +234,13 @@ def verify(
 
             results += [_verify_method(method, subject.kind, only, pairs, tell) for method in select([subject.text])]
     return results + [_verify_method(method, Kind.METHOD, only, pairs, tell) for method in methods]
+
+
+def _packages(subjects: Sequence[Any]) -> list[Path]:
+    """Return the folders that are subjects, and the folders of ROS packages in them, for `package://`."""
+    folders = [Path(text) for text in subjects if isinstance(text, str | os.PathLike) and Path(text).is_dir()]
+    inside = [file.parent.parent for folder in folders for file in sorted(folder.rglob("package.xml")) if file.parent != folder]
+    return list(dict.fromkeys([*folders, *inside]))
 
 
 def _verify_method(method: Method, kind: Kind, only: Sequence[str], pairs: Sequence[str], tell: Tell) -> Verification:

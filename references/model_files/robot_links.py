@@ -1,6 +1,6 @@
-"""Links of a model file with their shapes and joints, for checks of the file itself. No engine is needed for URDF, SDF and USD.
+"""Links of a model file with their shapes and joints, for checks of the file itself. No engine simulates anything.
 
-A link keeps its mass and inertia as they are written in the file. Its shapes, visual and collision, are points that span them.
+MJCF needs the package mujoco, because only MuJoCo defines how MJCF is read, and USD needs usd-core. A link keeps its mass and inertia as they are written in the file. Its shapes, visual and collision, are points that span them.
 """
 
 from __future__ import annotations
@@ -22,8 +22,10 @@ from ..worker.client import EngineCrashed, EngineTimeout
 from .collada import read_collada
 from .description import Description, is_true, numbers
 from .files import Unread, find, kind_of, load_mesh, parse, read_bytes, reason, refuse
-from .pieces import Link, Reading, make_pose
+from .mjcf import parse_mjcf
+from .pieces import DENSITY, Link, Reading, make_pose, rounding_of
 from .readers import MEMORY, SECONDS
+from .usd import Stage
 
 ROUND = 24
 """Number of points around a round shape."""
@@ -108,7 +110,12 @@ def read_robots_here(path: Path, label: str, search: Sequence[Path] = ()) -> lis
     kind = kind_of(path)
     allowed = "elements and numbers of its format"
     try:
-        robots = _read_xml(path, label, kind, search)
+        if kind == "mjcf":
+            robots = [_read_mjcf(path, label, search)]
+        elif kind == "usd":
+            robots = [_read_usd(path, label, search)]
+        else:
+            robots = _read_xml(path, label, kind, search)
     except BadInput:
         raise
     except RecursionError:
@@ -228,3 +235,141 @@ def _hull(points: Array, pose: Array) -> Array:
         return placed[ConvexHull(placed).vertices]
     except (QhullError, ValueError):
         return np.unique(placed, axis=0)[:1000]
+
+
+# --------------------------------------------------------------------------------------------------------------------- MJCF
+
+
+def _read_mjcf(path: Path, label: str, search: Sequence[Path]) -> Robot:
+    """Return the bodies of an MJCF file. MuJoCo compiles a copy in which masses and inertias that it refuses are replaced."""
+    mujoco, spec, _ = parse_mjcf(path, search)
+    options, off = spec.compiler, {"balanceinertia": 0, "boundmass": 0, "boundinertia": 0, "settotalmass": -1, "fusestatic": 0}
+    from_geometry = int(options.inertiafromgeom) == int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE)
+    for name, value in off.items():
+        setattr(options, name, value)
+    written: dict[int, tuple[float, Array, bool]] = {}
+    bodies = [body for body in spec.bodies if body != spec.worldbody]
+    for number, body in enumerate(bodies):
+        if body.explicitinertial and not from_geometry:
+            full = np.array(body.fullinertia)
+            tensor = np.diag(np.array(body.inertia))
+            if is_full := bool(np.isfinite(full[0])):
+                tensor = np.array([[full[0], full[3], full[4]], [full[3], full[1], full[5]], [full[4], full[5], full[2]]])
+            written[number] = float(body.mass), tensor, is_full
+        elif list(body.geoms) and any(geom.mass != 0 for geom in body.geoms):
+            continue
+        body.explicitinertial, body.mass, body.inertia = 1, 1.0, np.ones(3)
+        body.fullinertia = np.full(6, np.nan)
+    try:
+        model = spec.compile()
+    except (ValueError, mujoco.FatalError) as error:
+        message = " ".join(str(error).removeprefix("Error: ").split())
+        raise refuse(path, f"an error ({message})", "a file that MuJoCo compiles") from None
+    mujoco.mj_kinematics(model, data := mujoco.MjData(model))
+    robot, names = Robot(label, "mjcf"), [""] + [body.name or f"body {number}" for number, body in enumerate(bodies)]
+    for number, body in enumerate(bodies):
+        k = body.id
+        R = _matrix(mujoco, model.body_iquat[k])
+        pose = make_pose(data.xpos[k], data.xmat[k].reshape(3, 3))
+        if number in written:
+            mass, tensor, is_full = written[number]
+            frame = make_pose(model.body_ipos[k], None if is_full else R)
+        elif list(body.geoms):
+            mass, tensor, frame = float(model.body_mass[k]), np.diag(model.body_inertia[k]), make_pose(model.body_ipos[k], R)
+        else:
+            mass, tensor, frame = 0.0, np.zeros((3, 3)), np.eye(4)
+        link = Link(pose, mass, frame, tensor, name=names[number + 1], rounding=rounding_of(tensor.ravel().tolist()))
+        kinds = [mujoco.mjtJoint(joint.type).name.removeprefix("mjJNT_").lower() for joint in body.joints]
+        parent = names[[other.id for other in bodies].index(body.parent.id) + 1] if body.parent.id else ""
+        joint = " ".join(kinds) or ("fixed" if parent else "")
+        robot.links.append(RobotLink(link, parent, joint, number in written, _mjcf_shapes(mujoco, model, k)))
+    return robot
+
+
+def _matrix(mujoco: Any, quaternion: Array) -> Array:
+    R = np.zeros(9)
+    mujoco.mju_quat2Mat(R, quaternion)
+    return R.reshape(3, 3)
+
+
+def _mjcf_shapes(mujoco: Any, model: Any, body: int) -> list[Shape]:
+    """Return the shapes of a compiled body; geometries that touch nothing are visual."""
+    shapes = []
+    for g in np.flatnonzero(model.geom_bodyid == body):
+        kind = mujoco.mjtGeom(int(model.geom_type[g])).name.removeprefix("mjGEOM_").lower()
+        pose = make_pose(model.geom_pos[g], _matrix(mujoco, model.geom_quat[g]))
+        if kind == "mesh":
+            mesh = model.geom_dataid[g]
+            start = model.mesh_vertadr[mesh]
+            points = np.array(model.mesh_vert[start : start + model.mesh_vertnum[mesh]], float)
+        else:
+            half = {"box": (2, 2, 2), "sphere": (1,), "ellipsoid": (1, 1, 1), "capsule": (1, 2), "cylinder": (1, 2)}.get(kind, ())
+            points = shape_points(kind, [size * factor for size, factor in zip(model.geom_size[g], half, strict=False)])
+        if len(points):
+            shapes.append(Shape(_hull(points, pose), not (model.geom_contype[g] or model.geom_conaffinity[g])))
+    return shapes
+
+
+# ---------------------------------------------------------------------------------------------------------------------- USD
+
+
+def _read_usd(path: Path, label: str, search: Sequence[Path]) -> Robot:
+    """Return the rigid bodies of a USD file. A body without its own mass and inertia has those of its shapes."""
+    stage = Stage(path, search)
+    names = {str(body.GetPath()): body for body in stage.bodies}
+    parents: dict[str, tuple[str, str]] = {}
+    for joint in stage.joints:
+        api = stage.physics.Joint(joint)
+        ends = [[str(target) for target in end.GetTargets()] for end in (api.GetBody0Rel(), api.GetBody1Rel())]
+        if all(ends) and ends[0][0] in names and ends[1][0] in names and ends[1][0] not in parents:
+            kind = joint.GetTypeName().removeprefix("Physics").removesuffix("Joint").lower()
+            parents[ends[1][0]] = ends[0][0], kind
+    robot = Robot(label, "usd")
+    for name in _from_root(path, list(names), {child: parent for child, (parent, _) in parents.items()}):
+        body, (pose, scale) = names[name], stage.pose(names[name])
+        shapes, unread = _usd_shapes(stage, body)
+        mass, _, com, inertia = stage.authored(body)
+        written = bool(mass and mass > 0 and inertia is not None)
+        if written:
+            frame = make_pose(np.zeros(3) if com is None else scale @ com)
+            moments = body.GetAttribute("physics:diagonalInertia").Get()
+            rounding = rounding_of(map(np.float32, moments)) * stage.kilogram * stage.metre**2
+            link = Link(pose, float(mass or 0), frame, np.array(inertia), name=name, rounding=rounding)
+        else:
+            points = np.vstack([shape.points for shape in shapes]) if shapes else np.zeros((0, 3))
+            extent = np.ptp(points, axis=0) if len(points) else np.zeros(3)
+            weight = float(mass) if mass and mass > 0 else DENSITY * float(np.prod(extent))
+            middle = (points.min(axis=0) + points.max(axis=0)) / 2 if len(points) else np.zeros(3)
+            moments = weight / 12 * (extent @ extent - extent**2)
+            link = Link(pose, weight, make_pose(middle), np.diag(moments), name=name)
+        parent, kind = parents.get(name, ("", ""))
+        robot.links.append(RobotLink(link, parent, kind, written, shapes, unread))
+    return robot
+
+
+def _usd_shapes(stage: Stage, body: Any) -> tuple[list[Shape], list[str]]:
+    """Return the shapes below a body that are not of another body, and why others are not read."""
+    from pxr import Usd, UsdGeom
+
+    base, shapes, unread = np.linalg.inv(stage.pose(body)[0]), list[Shape](), list[str]()
+    prims = iter(Usd.PrimRange(body, Usd.TraverseInstanceProxies()))
+    for prim in prims:
+        if prim != body and prim in stage.bodies:
+            prims.PruneChildren()
+        elif prim.IsA(UsdGeom.Gprim):
+            kind = prim.GetTypeName().lower()
+            pose, scale = stage.pose(prim)
+            if kind == "mesh":
+                points = np.array(prim.GetAttribute("points").Get() or np.zeros((0, 3)), float)
+            else:
+                keys = {"cube": ("size",), "sphere": ("radius",)}.get(kind, ("radius", "height"))
+                sizes = [prim.GetAttribute(key).Get() for key in keys]
+                points = shape_points({"cube": "box"}.get(kind, kind), sizes * (3 if kind == "cube" else 1))
+                if len(sizes) == 2 and None not in sizes:
+                    points = points @ np.roll(np.eye(3), "XYZ".index(prim.GetAttribute("axis").Get()) - 2, axis=0).T
+            if len(points) > 3:
+                placed = stage.metre * points @ scale.T
+                shapes.append(Shape(_hull(placed, base @ pose), not prim.HasAPI(stage.physics.CollisionAPI)))
+            else:
+                unread.append(f"the shape {str(prim.GetPath())!r} of type {prim.GetTypeName()!r}")
+    return shapes, unread

@@ -161,6 +161,8 @@ def verify(
     kinds_in_order = [subject.kind for subject in expand(names)]
     kinds, alone = set(kinds_in_order), kinds_in_order == [Kind.RECORDING]
     options = used({"picture": picture, "scripts": scripts, **values}, kinds)
+    if not subjects:  # the masses of the small files are no robot's
+        options.setdefault("only", ["bodies"])
     if picture is not None and not alone:
         raise BadInput("picture", f"{len(kinds_in_order)} subjects", "one recording")
     drawn = alone and find_spec("pandas") is not None and find_spec("altair") is not None

@@ -19,12 +19,13 @@ import numpy as np
 from conservative.attitude import Array
 from conservative.errors import BadInput
 from conservative.references.model_files.files import reason
-from conservative.references.model_files.pieces import Piece, join, list_numbers
+from conservative.references.model_files.pieces import Piece, join, list_numbers, steiner
 from conservative.references.model_files.robot_links import Robot, RobotLink, read_robots
 
 from ..finding import Cause, Finding, Verdict, Verification
-from ..mistakes.bodies import FILES
-from .solids import Hull, compactness, hull_of, ratio, reach, unlike
+from ..mistakes.bodies import FILES, LOADED
+from ..mistakes.mistake import Mistake
+from .solids import DENSEST, Hull, density_of, hull_of, ratio, reach, unlike
 from .twins import Pair, find_pairs, part_of
 
 NOTHING = 0.05
@@ -34,14 +35,11 @@ NO_MASS = 1e-3
 FARTHEST = (1.5, 4.0)
 """`reach`: from the first on undecided, because shapes may be simplified, from the second on wrong. In right robots below 1.2;
 in popular ones with coarse shapes up to 3.8."""
-SMALLEST, LEAST_DENSE = 0.02, 100.0
-"""Inertia relative to that of the hull, for the same mass, below which it is wrong. A concentrated mass in a right robot has
-0.04. In a hull that is nearly empty, of a density in kg/m^3 below the second, no slip of one digit is concluded."""
 SLIP = (0.3, 2.5)
 """Inertia relative to that of the hull after the repair of a decimal slip. Less than a decade, so that one power is in it at
 most; 98 % of the links whose proportions are those of the hull are in it."""
-SLIPPED = (0.12, 7.0)
-"""Inertia relative to that of the hull outside of which a decimal slip is looked for. Right links: 0.21 to 4.9."""
+SLIPPED = 7.0
+"""Inertia relative to that of the hull beyond which a decimal slip is looked for, if it reaches outside. Right links: to 4.9."""
 ALIKE = 0.1
 """Largest `unlike` of an inertia that has the proportions of the hull."""
 OUTSIDE = (0.05, 0.2)
@@ -55,7 +53,7 @@ TURNED = 0.1
 GRAVITY = 9.81
 """Acceleration of gravity, m/s^2."""
 
-_BY_KEY = {mistake.key: mistake for mistake in FILES}
+_BY_KEY: Mapping[str, Mistake] = {mistake.key: mistake for mistake in (*LOADED, *FILES)}
 
 
 @dataclass(frozen=True)
@@ -292,6 +290,10 @@ def _motion(link: RobotLink, body: Body, fault: Fault) -> str:
         return "no body moves like this: its free motion is the motion of no rigid body" if fault.key == "impossible inertia" else ""
     then = body.whole(link, fault.expected)
     texts = []
+    if max(whole.mass / then.mass, then.mass / whole.mass) > 1.5:
+        fast = then.mass > whole.mass
+        times = max(whole.mass / then.mass, then.mass / whole.mass)
+        texts.append(f"it accelerates {_rounded(times)} times too {'fast' if fast else 'slowly'} under the same force")
     moved = float(np.linalg.norm(part.com - fault.expected.com))
     if moved > 1e-3 * math.sqrt(np.trace(then.inertia) / then.mass):
         torque = GRAVITY * part.mass * moved
@@ -310,8 +312,12 @@ def _too_fast(low: float, high: float) -> str:
     times = max(high, 1 / low)
     if times < 1.005:
         return ""
-    rounded = f"{100 * (times - 1):.2g} %" if times < 1.5 else f"{float(f'{times:.2g}'):,.10g} times"
+    rounded = f"{100 * (times - 1):.2g} %" if times < 1.5 else f"{_rounded(times)} times"
     return f"it turns up to {rounded} too {'fast' if high > 1 / low else 'slowly'} under the same torque"
+
+
+def _rounded(times: float) -> str:
+    return f"{float(f'{times:.2g}'):,.10g}"
 
 
 def _reversed(inertia: Array, expected: Array) -> str:
@@ -351,7 +357,9 @@ def _faults(link: RobotLink, body: Body, twin: tuple[Pair, bool] | None) -> Iter
     solid = _solid(part, own)
     mirrored = twin[0].mirrored(twin[1]) if twin else None
     if part.flaw:
-        yield _impossible(link, part, own, mirrored, twin)
+        sign = _sign(link, part, own) if part.mass > 0 else None
+        possible = sign is not None and sign.expected is not None and not sign.expected.flaw
+        yield sign if sign and possible else _impossible(link, part, own, mirrored, twin)
         if not part.mass > 0 or not part.inertia.any():
             return
     else:
@@ -434,7 +442,7 @@ def _single_slips(link: RobotLink, part: Piece, hulls: Sequence[Hull]) -> Iterat
         inertia[i, j] = inertia[j, i] = inertia[i, j] * 10.0**power
         placed = turn @ inertia @ turn.T
         changed = replace(part, inertia=placed)
-        if changed.flaw or compactness(changed) < 1:
+        if changed.flaw or density_of(changed, ()) > DENSEST:
             continue
         if hulls:
             fits = [
@@ -443,44 +451,35 @@ def _single_slips(link: RobotLink, part: Piece, hulls: Sequence[Hull]) -> Iterat
             ]
             if any(fits):
                 yield name, power, placed
-        elif abs(power) == 1:  # without shapes, a slip of one digit
+        elif abs(power) == 1 and i == j:  # without shapes, a slip of one digit of a moment
             yield name, power, placed
 
 
 def _size(link: RobotLink, part: Piece, hulls: Sequence[Hull], body: Body, solid: Piece | None) -> Fault | None:
     """Return the fault of an inertia that is too small or too large for the mass and the shapes."""
-    compact = compactness(part)
     ratios = [ratio(part.inertia, hull.solid.inertia * part.mass) for hull in hulls]
     relative = min(ratios, key=lambda value: abs(math.log(value))) if ratios and min(ratios) > 0 else 1.0
-    inside = body.hull
-    far = reach(part.place(body.to_root(link)), inside) if inside else 0.0
     alike = [hull for hull in hulls if unlike(part.inertia, hull.solid.inertia) < ALIKE]
-    density = part.mass / max(hull.volume for hull in hulls) if hulls else math.inf
-    small = compact < 1 or relative < SMALLEST
-    large = far > FARTHEST[1]
-    slipped = bool(alike) and (
-        (relative < SLIPPED[0] and density > LEAST_DENSE) or (relative > SLIPPED[1] and far > FARTHEST[0])
-    )
+    density = density_of(part, alike if relative < SLIP[0] else ())  # a plate may be drawn too thin
+    far = reach(part.place(body.to_root(link)), body.hull) if body.hull else 0.0
+    small, large = density > DENSEST, far > FARTHEST[1]
+    slipped = bool(alike) and relative > SLIPPED and far > FARTHEST[0]
     text = f"moments {list_numbers(np.linalg.eigvalsh(part.inertia))} kg m^2 for {part.mass:.4g} kg"
+    text += f", {_times(relative)} what its shapes have" if solid else ""
     expected = solid or _ball(part)
-    if solid:
-        text += f", {_times(relative)} those of its shapes"
-    elif compact < 1:
-        text += f", {_times(compact)} those of a ball of the densest material"
+    if small:
+        text += f"; a body like this would have {_rounded(density)} kg/m^3"
+    elif far > FARTHEST[0]:
+        text += f"; its radius of gyration is {math.sqrt(far):.2g} times as far as its shapes reach"
     if not (small or large or slipped):
-        if far > FARTHEST[0]:
-            undecided = f"{text}; its radius of gyration is {math.sqrt(far):.2g} times as far as its shapes reach"
-            return Fault(
-                "inertia outside the shapes", undecided, far, FARTHEST[0], "times", "shapes", expected,
-                verdict=Verdict.UNDECIDED,
-            )  # fmt: skip
-        return None
-    error, allowed = (1 / max(min(compact, relative), 1e-12), 1.0 if compact < 1 else 1 / SMALLEST) if small else (far, 1.0)
-    by = "density" if compact < 1 else "shapes"
-    if not (small or large):
-        error, allowed = max(relative, 1 / relative), SLIPPED[1] if relative > 1 else 1 / SLIPPED[0]
+        doubt = Fault("inertia outside the shapes", text, far, FARTHEST[0], "times", "shapes", expected)
+        return replace(doubt, verdict=Verdict.UNDECIDED) if far > FARTHEST[0] else None
+    error, allowed, unit, by = (density, DENSEST, "kg/m^3", "materials") if small else (far, FARTHEST[0], "times", "shapes")
+    if large and (moved := _about_the_origin(part, hulls)):
+        repair = "subtract the term of the parallel axis theorem: the inertia is about the origin of the link"
+        return Fault("inertia moved twice", text, error, allowed, unit, by, moved, repair)
     if is_placeholder(link.link.inertia):
-        return Fault("placeholder inertia", text, error, allowed, "times", by, expected, "")
+        return Fault("placeholder inertia", text, error, allowed, unit, by, expected, "")
     powers = [power for power in range(-6, 7) if power and SLIP[0] < relative * 10.0**power < SLIP[1]] if alike else []
     if len(powers) == 1:
         power = powers[0]
@@ -490,9 +489,20 @@ def _size(link: RobotLink, part: Piece, hulls: Sequence[Hull], body: Body, solid
         usual = DENSITIES[0] < weight / volume < DENSITIES[1]
         if not DENSITIES[0] < part.mass / volume < DENSITIES[1] and usual:
             repaired, repair = replace(part, mass=weight), f"multiply the mass by 10^{-power}"
-        return Fault("decimal slip", text, error, allowed, "times", by, repaired, repair, numbers={"power": float(power)})
+        return Fault("decimal slip", text, error, allowed, unit, by, repaired, repair, numbers={"power": float(power)})
     key = "inertia too small" if small else "inertia outside the shapes"
-    return Fault(key, text, error, allowed, "times", by, expected)
+    return Fault(key, text, error, allowed, unit, by, expected)
+
+
+def _about_the_origin(part: Piece, hulls: Sequence[Hull]) -> Piece | None:
+    """Return a part whose inertia was about the origin of the link, moved to its centre, if it has the proportions of a hull."""
+    moved = replace(part, inertia=part.inertia - steiner(part.mass, part.com))
+    alike = (
+        unlike(moved.inertia, hull.solid.inertia) < ALIKE
+        and SLIP[0] < ratio(moved.inertia, hull.solid.inertia * part.mass) < SLIP[1]
+        for hull in hulls
+    )
+    return moved if np.linalg.norm(part.com) > 0 and not moved.flaw and any(alike) else None
 
 
 DENSITIES = (50.0, 9000.0)
@@ -506,7 +516,7 @@ def _ball(part: Piece) -> Piece:
 
 
 def _times(value: float) -> str:
-    return f"1/{float(f'{1 / value:.2g}'):,.10g} of" if value < 1 else f"{float(f'{value:.2g}'):,.10g} times"
+    return f"1/{_rounded(1 / value)} of" if value < 1 else f"{_rounded(value)} times"
 
 
 def is_placeholder(inertia: Array) -> bool:
@@ -616,7 +626,8 @@ def _compare_twins(pair: Pair, faults: dict[str, list[Fault]], bodies: Mapping[s
             continue
         expected = pair.mirrored(of_right)
         alone = len(suspects) == 1
-        text = f"the {name} and {other.name!r}'s differ by {100 * worst:.3g} %"
+        verb = "differs" if name in ("mass", "centre of mass") else "differ"
+        text = f"the {name} {verb} from {other.name!r} by {100 * worst:.3g} %"
         text += ": one of the two is wrong" if verdict is Verdict.WRONG and not alone else ""
         repair = f"the mirrored values of {other.name!r}" if alone and expected is not None else ""
         faults[link.name].insert(
