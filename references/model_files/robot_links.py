@@ -247,6 +247,7 @@ def _read_mjcf(path: Path, label: str, search: Sequence[Path]) -> Robot:
     from_geometry = int(options.inertiafromgeom) == int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE)
     for name, value in off.items():
         setattr(options, name, value)
+    unread = _drop_missing_meshes(spec, path, search)
     written: dict[int, tuple[float, Array, bool]] = {}
     bodies = [body for body in spec.bodies if body != spec.worldbody]
     for number, body in enumerate(bodies):
@@ -256,7 +257,7 @@ def _read_mjcf(path: Path, label: str, search: Sequence[Path]) -> Robot:
             if is_full := bool(np.isfinite(full[0])):
                 tensor = np.array([[full[0], full[3], full[4]], [full[3], full[1], full[5]], [full[4], full[5], full[2]]])
             written[number] = float(body.mass), tensor, is_full
-        elif list(body.geoms) and any(geom.mass != 0 for geom in body.geoms):
+        elif list(body.geoms) and any(geom.mass != 0 for geom in body.geoms) and body.name not in unread:
             continue
         body.explicitinertial, body.mass, body.inertia = 1, 1.0, np.ones(3)
         body.fullinertia = np.full(6, np.nan)
@@ -282,8 +283,33 @@ def _read_mjcf(path: Path, label: str, search: Sequence[Path]) -> Robot:
         kinds = [mujoco.mjtJoint(joint.type).name.removeprefix("mjJNT_").lower() for joint in body.joints]
         parent = names[[other.id for other in bodies].index(body.parent.id) + 1] if body.parent.id else ""
         joint = " ".join(kinds) or ("fixed" if parent else "")
-        robot.links.append(RobotLink(link, parent, joint, number in written, _mjcf_shapes(mujoco, model, k)))
+        missing = unread.get(body.name, [])
+        robot.links.append(RobotLink(link, parent, joint, number in written, _mjcf_shapes(mujoco, model, k), missing))
     return robot
+
+
+def _drop_missing_meshes(spec: Any, path: Path, search: Sequence[Path]) -> dict[str, list[str]]:
+    """Remove what is drawn only, and geometries whose mesh is not there. Return why, by the names of their bodies."""
+    for geom in spec.geoms:
+        geom.material = ""
+    for unused in [*spec.skins, *spec.materials, *spec.textures]:
+        spec.delete(unused)
+    unread: dict[str, list[str]] = {}
+    folder = spec.compiler.meshdir
+    for mesh in [mesh for mesh in spec.meshes if mesh.file]:
+        name = f"{folder}/{mesh.file}" if folder else mesh.file
+        try:
+            file = find(path, name, search, "mesh")
+        except Unread as error:
+            named = mesh.name or Path(mesh.file).stem
+            for geom in [geom for geom in spec.geoms if geom.meshname == named]:
+                unread.setdefault(geom.parent.name, []).append(str(error))
+                spec.delete(geom)
+            spec.delete(mesh)
+        else:
+            mesh.name = mesh.name or Path(mesh.file).stem
+            mesh.file = str(file.resolve())
+    return unread
 
 
 def _matrix(mujoco: Any, quaternion: Array) -> Array:

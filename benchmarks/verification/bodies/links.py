@@ -35,9 +35,11 @@ NO_MASS = 1e-3
 FARTHEST = (1.5, 4.0)
 """`reach`: from the first on undecided, because shapes may be simplified, from the second on wrong. In right robots below 1.2;
 in popular ones with coarse shapes up to 3.8."""
-SLIP = (0.3, 2.5)
-"""Inertia relative to that of the hull after the repair of a decimal slip. Less than a decade, so that one power is in it at
-most; 98 % of the links whose proportions are those of the hull are in it."""
+SLIP = (0.4, 2.0)
+"""Inertia relative to that of the hull after the repair of a decimal slip: less than a decade, so that one power is in it at
+most. Of the links whose proportions are those of the hull, nine in ten are in it."""
+LIGHT, HEAVY = 0.3, 2.0
+"""Inertia relative to that of the hull from which on it can be too small or too large for the shapes."""
 SLIPPED = 7.0
 """Inertia relative to that of the hull beyond which a decimal slip is looked for, if it reaches outside. Right links: to 4.9."""
 ALIKE = 0.1
@@ -460,9 +462,9 @@ def _size(link: RobotLink, part: Piece, hulls: Sequence[Hull], body: Body, solid
     ratios = [ratio(part.inertia, hull.solid.inertia * part.mass) for hull in hulls]
     relative = min(ratios, key=lambda value: abs(math.log(value))) if ratios and min(ratios) > 0 else 1.0
     alike = [hull for hull in hulls if unlike(part.inertia, hull.solid.inertia) < ALIKE]
-    density = density_of(part, alike if relative < SLIP[0] else ())  # a plate may be drawn too thin
+    density = density_of(part, alike if relative < LIGHT else ())  # a plate may be drawn too thin
     far = reach(part.place(body.to_root(link)), body.hull) if body.hull else 0.0
-    small, large = density > DENSEST, far > FARTHEST[1]
+    small, large = density > DENSEST, far > FARTHEST[1] and (relative > HEAVY or not solid)
     slipped = bool(alike) and relative > SLIPPED and far > FARTHEST[0]
     text = f"moments {list_numbers(np.linalg.eigvalsh(part.inertia))} kg m^2 for {part.mass:.4g} kg"
     text += f", {_times(relative)} what its shapes have" if solid else ""
