@@ -68,7 +68,8 @@ class Finding:
     verdict
         Right, wrong, undecided or not tested.
     error, allowed, unit
-        Largest error and the largest error that is allowed, rad, relative, a factor ("times") or kg/m^3; nan if nothing was measured.
+        Largest error and the largest error that is allowed, rad, relative, a factor ("times") or a density, kg/m^3; nan if
+        nothing was measured.
     by
         What decides the allowed error: digits, noise, order, rounding, shapes, the option --error.
     causes

@@ -164,7 +164,7 @@ def verify(
     body
         Scene, its name or its file, for recordings.
     engines
-        Engines that load model files; by default those that are installed. Without one, only the links of the files are checked.
+        Engines that load model files; by default those that are installed. Without one, only links are checked.
     only
         Names of checks, see `finding.CHECKS`; by default all that fit a subject.
     pairs
@@ -212,10 +212,7 @@ def verify(
     if unused := set(only) - {check for kind in kinds for check in CHECKS_OF[kind]}:
         allowed = ", ".join(dict.fromkeys(check for kind in kinds for check in CHECKS_OF[kind]))
         raise BadInput("only", repr(sorted(unused)[0]), f"checks of {' and '.join(sorted(kinds))}: {allowed}")
-    if engines and only and "bodies" not in only:
-        raise BadInput("engines", f"{', '.join(engines)!r} without the check of bodies", "bodies in --only, or no --only")
-    if pairs and only and "pairs" not in only:
-        raise BadInput("pairs", f"{', '.join(pairs)!r} without the check of pairs", "pairs in --only, or no --only")
+    _refuse_left_out(only, bodies=("engines", engines), pairs=("pairs", pairs))
     results: list[Verification] = []
     if files := [subject.path for subject in expanded if subject.kind is Kind.MODEL and subject.path]:
         from .bodies import verify_models
@@ -315,3 +312,11 @@ def _refuse_unused(kinds: set[Kind], **options: Any) -> None:
         users = USED_BY.get(name, (Kind.RECORDING,))
         if value not in (None, (), [], "") and not kinds & set(users):
             raise BadInput(name, "an option that no subject uses", f"a subject that is a {' or a '.join(users)}")
+
+
+def _refuse_left_out(only: Sequence[str], **options: tuple[str, Sequence[str]]) -> None:
+    """Raise `BadInput` for an option with names that belongs to a check, by the name of the check, which is left out."""
+    for check, (name, names) in options.items():
+        if names and only and check not in only:
+            got = f"{', '.join(names)!r} without the check of {check}"
+            raise BadInput(name, got, f"{check} in --only, or no --only")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -33,46 +34,41 @@ def read_collada(data: bytes) -> Array:
         if isinstance(element.tag, str):
             element.tag = element.tag.rpartition("}")[2]
     unit = root.find("asset/unit")
-    metre = float(unit.get("meter", "1")) if unit is not None else 1.0
-    by_id = {element.get("id"): element for element in root.iter("geometry", "source", "float_array", "node", "vertices")}
-    points: list[Array] = []
-
-    def add(geometry: Any, pose: Array) -> None:
-        for vertices in geometry.iter("vertices"):
-            for entry in vertices.findall("input"):
-                source = by_id.get(entry.get("source", "")[1:]) if entry.get("semantic") == "POSITION" else None
-                values = None if source is None else source.find("float_array")
-                if values is not None and values.text:
-                    numbers = np.array(values.text.split(), float)
-                    xyz = numbers[: len(numbers) // 3 * 3].reshape(-1, 3)
-                    points.append(xyz @ pose[:3, :3].T + pose[:3, 3])
-
-    def walk(node: Any, pose: Array, depth: int) -> None:
-        if depth > DEEPEST:
-            raise Unread("a mesh whose nodes are nested too deep")
-        for child in node:
-            if child.tag in ("matrix", "translate", "rotate", "scale"):
-                pose = pose @ _transform(child)
-            elif child.tag in ("instance_geometry", "instance_controller"):
-                geometry = by_id.get(child.get("url", "")[1:])
-                if geometry is not None:
-                    add(geometry, pose)
-            elif child.tag == "instance_node":
-                other = by_id.get(child.get("url", "")[1:])
-                if other is not None:
-                    walk(other, pose, depth + 1)
-            elif child.tag == "node":
-                walk(child, pose, depth + 1)
-
-    for scene in root.iter("visual_scene"):
-        walk(scene, np.eye(4), 0)
-    if not points:  # a file without a scene
-        for geometry in root.iter("geometry"):
-            add(geometry, np.eye(4))
+    metre = 1.0 if unit is None else float(unit.get("meter", "1"))
+    by_id = {element.get("id"): element for element in root.iter("geometry", "source", "node")}
+    scenes = [points for scene in root.iter("visual_scene") for points in _walk(scene, np.eye(4), by_id)]
+    points = scenes or [points for geometry in root.iter("geometry") for points in _points(geometry, np.eye(4), by_id)]
     whole = metre * np.vstack(points) if points else np.zeros((0, 3))
     if not len(whole) or not np.isfinite(whole).all():
         raise Unread("a mesh without points, or with points that are not finite")
     return whole
+
+
+def _walk(node: Any, pose: Array, by_id: Mapping[str, Any], depth: int = 0) -> Iterator[Array]:
+    """Yield the points (n, 3) of the geometries below a node of a scene."""
+    if depth > DEEPEST:
+        raise Unread("a mesh whose nodes are nested too deep")
+    for child in node:
+        other = by_id.get(child.get("url", "")[1:])
+        if child.tag in ("matrix", "translate", "rotate", "scale"):
+            pose = pose @ _transform(child)
+        elif child.tag == "node":
+            yield from _walk(child, pose, by_id, depth + 1)
+        elif child.tag == "instance_node" and other is not None:
+            yield from _walk(other, pose, by_id, depth + 1)
+        elif child.tag == "instance_geometry" and other is not None:
+            yield from _points(other, pose, by_id)
+
+
+def _points(geometry: Any, pose: Array, by_id: Mapping[str, Any]) -> Iterator[Array]:
+    """Yield the vertices (n, 3) of a geometry after a map `pose` (4, 4)."""
+    for entry in geometry.iterfind(".//vertices/input[@semantic='POSITION']"):
+        source = by_id.get(entry.get("source", "")[1:])
+        values = None if source is None else source.find("float_array")
+        if values is not None and values.text:
+            numbers = np.array(values.text.split(), float)
+            xyz = numbers[: len(numbers) // 3 * 3].reshape(-1, 3)
+            yield xyz @ pose[:3, :3].T + pose[:3, 3]
 
 
 def _transform(element: Any) -> Array:

@@ -1,6 +1,7 @@
 """Links of a model file with their shapes and joints, for checks of the file itself. No engine simulates anything.
 
-MJCF needs the package mujoco, because only MuJoCo defines how MJCF is read, and USD needs usd-core. A link keeps its mass and inertia as they are written in the file. Its shapes, visual and collision, are points that span them.
+MJCF needs the package mujoco, because only MuJoCo defines how MJCF is read, and USD needs usd-core. A link keeps its mass and
+inertia as they are written in the file. Its shapes, visual and collision, are points that span them.
 """
 
 from __future__ import annotations
@@ -329,7 +330,9 @@ def _mjcf_shapes(mujoco: Any, model: Any, body: int) -> list[Shape]:
             start = model.mesh_vertadr[mesh]
             points = np.array(model.mesh_vert[start : start + model.mesh_vertnum[mesh]], float)
         else:
-            half = {"box": (2, 2, 2), "sphere": (1,), "ellipsoid": (1, 1, 1), "capsule": (1, 2), "cylinder": (1, 2)}.get(kind, ())
+            half = {"box": (2, 2, 2), "sphere": (1,), "ellipsoid": (1, 1, 1), "capsule": (1, 2), "cylinder": (1, 2)}.get(
+                kind, ()
+            )
             points = shape_points(kind, [size * factor for size, factor in zip(model.geom_size[g], half, strict=False)])
         if len(points):
             shapes.append(Shape(_hull(points, pose), not (model.geom_contype[g] or model.geom_conaffinity[g])))

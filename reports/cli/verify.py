@@ -119,7 +119,11 @@ LISTS = ("only", "pairs", "engines")
 @click.option("--junit", type=Output('name="conservative verify"'), help="Write a JUnit report.")
 @click.option("--markdown", type=Output(FILES["verify.md"]), help="Write the tables as Markdown.")
 @click.option("--csv", type=Output(FILES["verify.csv"]), help="Write the findings as CSV.")
-@option("out", f"Write {', '.join(FILES)} into this folder; the page only for model files, errors only for a recording.", type=Output(FILES))
+@option(
+    "out",
+    f"Write {', '.join(FILES)} into this folder; the page only for model files, errors only for a recording.",
+    type=Output(FILES),
+)
 @picture_option
 @click.pass_context
 def verify(
@@ -139,8 +143,9 @@ def verify(
 
     A SUBJECT is a recording (CSV or JSON lines), an engine with a version or a setting, a method of this package, a program
     (its name, its file, or a quoted command line), a model file (URDF, SDF, MJCF, USD), or a folder of recordings or of model
-    files. Two recordings are also compared with each other. The links of model files are checked without an engine. With --engines and no SUBJECT, engines load the small model files
-    of this package, each of which tests one rule of a format.
+    files. A folder without such files stands for the models in the folders below it. Two recordings are also compared with each
+    other. The links of model files are checked without an engine. With --engines and no SUBJECT, engines load the small model
+    files of this package, each of which tests one rule of a format.
 
     The exit code is 0 if all subjects are right, 1 if one is wrong, and 3 if one is undecided or not tested.
     """

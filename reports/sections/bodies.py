@@ -15,9 +15,7 @@ def body_blocks(verifications: Sequence[Verification]) -> list[Block]:
     """Return the blocks for verifications of model files: the verdicts, what is not right, the bodies by all readers, notes."""
     from conservative.benchmarks.verification.finding import Verdict
 
-    findings = [
-        finding for verification in verifications for finding in verification.findings if finding.check == "bodies"
-    ]
+    findings = [finding for verification in verifications for finding in verification.findings if finding.check == "bodies"]
     notes = [Item(note, verification.subject) for verification in verifications for note in verification.notes]
     if not findings:
         return filled(Items(notes))

@@ -55,9 +55,9 @@ def _files(verifications: Sequence[Verification]) -> Table:
 def _row(subject: str, finding: Any, several: bool, full: bool = False) -> Row:
     verdict = Cell(str(finding.verdict), GRADES.get(str(finding.verdict), Grade.NONE))
     mistakes = ", ".join(key for cause in finding.causes for key in cause.keys)
-    sizes = []
+    sizes: list[str | Cell] = []
     if full:
         moments = " ".join(f"{moment:.3g}" for moment in finding.moments)
         sizes = [Cell(f"{finding.mass:.4g} kg" if finding.mass == finding.mass else DASH, value=finding.mass), moments or DASH]
-    rest = [mistakes, finding.detail, finding.effect, finding.repair]
-    return [*([subject] if several else []), finding.case or DASH, verdict, *sizes, *(text or DASH for text in rest)]
+    texts = [text or DASH for text in (mistakes, finding.detail, finding.effect, finding.repair)]
+    return [*([subject] if several else []), finding.case or DASH, verdict, *sizes, *texts]

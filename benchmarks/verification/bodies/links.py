@@ -29,7 +29,7 @@ from .solids import DENSEST, Hull, density_of, hull_of, ratio, reach, unlike
 from .twins import Pair, find_pairs, part_of
 
 NOTHING = 0.05
-"""Largest relative change of an angular acceleration that is no fault: then a mistake in one of several links does not matter."""
+"""Largest relative change of an angular acceleration that is no fault, if several links are fixed to each other."""
 NO_MASS = 1e-3
 """Share of the mass of a body below which even an impossible inertia does not matter: placeholders of 1e-6 kg are common."""
 FARTHEST = (1.5, 4.0)
@@ -41,7 +41,7 @@ most. Of the links whose proportions are those of the hull, nine in ten are in i
 LIGHT, HEAVY = 0.3, 2.0
 """Inertia relative to that of the hull from which on it can be too small or too large for the shapes."""
 SLIPPED = 7.0
-"""Inertia relative to that of the hull beyond which a decimal slip is looked for, if it reaches outside. Right links: to 4.9."""
+"""Inertia relative to that of the hull beyond which a slip is looked for, if it reaches outside. Right links: up to 4.9."""
 ALIKE = 0.1
 """Largest `unlike` of an inertia that has the proportions of the hull."""
 OUTSIDE = (0.05, 0.2)
@@ -140,7 +140,8 @@ def _notes(robot: Robot) -> Iterator[str]:
     if unread:
         count = sum(bool(link.unread) for link in robot.links)
         first = next(iter(unread))
-        yield f"{count} of {len(robot.links)} links have shapes that are not read, so that less is tested: {first} (--search FOLDER)"
+        unread_links = f"{count} of {len(robot.links)} links have shapes that are not read, so that less is tested"
+        yield f"{unread_links}: {first} (--search FOLDER)"
 
 
 def _summary(findings: Sequence[Finding]) -> str:
@@ -211,38 +212,31 @@ def judge(robot: Robot, subject: str) -> list[LinkFinding]:
 def _finding(link: RobotLink, body: Body, faults: Sequence[Fault], subject: str, prefix: str) -> LinkFinding:
     name = f"{prefix}: {link.name}" if prefix else link.name
     moments = tuple(np.linalg.eigvalsh(link.link.inertia).tolist())
-    known = {"mass": link.link.mass, "moments": moments}
-    if not link.written and not faults:
-        return LinkFinding(subject, "links", name, Verdict.RIGHT, detail="it has no inertia of its own", **known)
+    right = LinkFinding(subject, "links", name, Verdict.RIGHT, mass=link.link.mass, moments=moments)
     if not faults:
-        return LinkFinding(subject, "links", name, Verdict.RIGHT, **known)
+        return right if link.written else replace(right, detail="it has no inertia of its own")
     matter = [fault for fault in faults if not _harmless(link, body, fault)]
     if not matter:
         text = f"{faults[0].text}, which does not change the motion of {body.root.name!r}, to which it is fixed"
-        return LinkFinding(subject, "links", name, Verdict.RIGHT, detail=text, **known)
+        return replace(right, detail=text)
     wrong = [fault for fault in matter if fault.verdict is Verdict.WRONG] or matter
     main = wrong[0]
     effects = [fault.effect or _effect(link, body, fault) for fault in wrong]
-    cause = Cause(
-        tuple(dict.fromkeys(fault.key for fault in wrong)),
-        ". ".join(dict.fromkeys(_BY_KEY[fault.key].sentence.format(**fault.numbers) for fault in wrong)),
-        numbers=main.numbers,
-        remedy="; ".join(filter(None, (fault.repair for fault in wrong))),
-    )
-    return LinkFinding(
-        subject,
-        "links",
-        name,
-        main.verdict,
-        main.error,
-        main.allowed,
-        main.unit,
-        main.by,
-        (cause,) if main.verdict is Verdict.WRONG else (),
-        "; ".join(fault.text for fault in wrong),
+    repair = "; ".join(filter(None, (fault.repair for fault in wrong)))
+    sentences = [_BY_KEY[fault.key].sentence.format(**fault.numbers) for fault in wrong]
+    keys = tuple(dict.fromkeys(fault.key for fault in wrong))
+    cause = Cause(keys, ". ".join(dict.fromkeys(sentences)), numbers=main.numbers, remedy=repair)
+    return replace(
+        right,
+        verdict=main.verdict,
+        error=main.error,
+        allowed=main.allowed,
+        unit=main.unit,
+        by=main.by,
+        causes=(cause,) if main.verdict is Verdict.WRONG else (),
+        detail="; ".join(fault.text for fault in wrong),
         effect="; ".join(dict.fromkeys(filter(None, effects))),
-        repair=cause.remedy,
-        **known,
+        repair=repair,
     )
 
 
@@ -289,7 +283,11 @@ def _motion(link: RobotLink, body: Body, fault: Fault) -> str:
     if not moments[0] > 1e-9 * moments[2]:
         return "it accelerates without limit under a torque about one axis"
     if fault.expected is None:
-        return "no body moves like this: its free motion is the motion of no rigid body" if fault.key == "impossible inertia" else ""
+        return (
+            "no body moves like this: its free motion is the motion of no rigid body"
+            if fault.key == "impossible inertia"
+            else ""
+        )
     then = body.whole(link, fault.expected)
     texts = []
     if max(whole.mass / then.mass, then.mass / whole.mass) > 1.5:
@@ -365,9 +363,7 @@ def _faults(link: RobotLink, body: Body, twin: tuple[Pair, bool] | None) -> Iter
         if not part.mass > 0 or not part.inertia.any():
             return
     else:
-        if fault := _size(link, part, own, body, solid):
-            yield fault
-        elif fault := _sign(link, part, own):
+        if (fault := _size(link, part, own, body, solid)) or (fault := _sign(link, part, own)):
             yield fault
     if fault := _centre(link, part, body):
         yield fault
@@ -497,7 +493,7 @@ def _size(link: RobotLink, part: Piece, hulls: Sequence[Hull], body: Body, solid
 
 
 def _about_the_origin(part: Piece, hulls: Sequence[Hull]) -> Piece | None:
-    """Return a part whose inertia was about the origin of the link, moved to its centre, if it has the proportions of a hull."""
+    """Return a part with an inertia about the origin of the link, moved to its centre, if it then is like a hull."""
     moved = replace(part, inertia=part.inertia - steiner(part.mass, part.com))
     alike = (
         unlike(moved.inertia, hull.solid.inertia) < ALIKE
@@ -588,7 +584,10 @@ def _centre(link: RobotLink, part: Piece, body: Body) -> Fault | None:
 
 def _moved(com: Array, hull: Hull) -> Iterator[tuple[str, Array]]:
     """Yield the changes of a centre of mass that bring it well inside the hull: another sign of one number, or another unit."""
-    options = [(f"change the sign of {'xyz'[axis]} of the centre of mass", com * np.where(np.arange(3) == axis, -1, 1)) for axis in range(3)]
+    options = [
+        (f"change the sign of {'xyz'[axis]} of the centre of mass", com * np.where(np.arange(3) == axis, -1, 1))
+        for axis in range(3)
+    ]
     options += [(f"multiply the centre of mass by 10^{-power}", com / 10.0**power) for power in (1, 2, 3)]
     for text, moved in options:
         if np.linalg.norm(moved - com) > 1e-9 and hull.outside(moved) < -0.02 * hull.size:
@@ -632,9 +631,7 @@ def _compare_twins(pair: Pair, faults: dict[str, list[Fault]], bodies: Mapping[s
         text = f"the {name} {verb} from {other.name!r} by {100 * worst:.3g} %"
         text += ": one of the two is wrong" if verdict is Verdict.WRONG and not alone else ""
         repair = f"the mirrored values of {other.name!r}" if alone and expected is not None else ""
-        faults[link.name].insert(
-            0, Fault("twins differ", text, worst, limit, "relative", "twin", expected, repair, verdict)
-        )
+        faults[link.name].insert(0, Fault("twins differ", text, worst, limit, "relative", "twin", expected, repair, verdict))
 
 
 def _suspects(pair: Pair, faults: Mapping[str, list[Fault]]) -> list[RobotLink]:
