@@ -73,10 +73,13 @@ class RobotLink:
 
 @dataclass
 class Robot:
-    """A model of a file: its links, parents before children, and notes on what was not read."""
+    """A model of a file: its links, parents before children, and notes on what was not read.
 
-    file: str
+    `name` is the name of the model if the file has several, and "" otherwise.
+    """
+
     kind: str
+    name: str = ""
     links: list[RobotLink] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
@@ -89,13 +92,11 @@ def read_robots(
     `tell` is called with the share that is done and the name of the next file.
     """
     worker, results = python_worker({"OPENBLAS_NUM_THREADS": "1"}, MEMORY), list[list[Robot] | BadInput]()
-    unique = len({path.name for path in paths}) == len(paths)
     try:
         for number, path in enumerate(paths):
-            label = path.name if unique else str(path)
-            tell(number / len(paths), label)
+            tell(number / len(paths), path.name)
             try:
-                results.append(run_within(SECONDS, partial(read_robots_here, path, label, search), process=worker))
+                results.append(run_within(SECONDS, partial(read_robots_here, path, search), process=worker))
             except BadInput as error:
                 results.append(error)
             except (EngineCrashed, EngineTimeout) as failure:
@@ -106,17 +107,17 @@ def read_robots(
     return results
 
 
-def read_robots_here(path: Path, label: str, search: Sequence[Path] = ()) -> list[Robot]:
+def read_robots_here(path: Path, search: Sequence[Path] = ()) -> list[Robot]:
     """Return the models of a file as `read_robots`, in this process. Raise `BadInput`."""
     kind = kind_of(path)
     allowed = "elements and numbers of its format"
     try:
         if kind == "mjcf":
-            robots = [_read_mjcf(path, label, search)]
+            robots = [_read_mjcf(path, search)]
         elif kind == "usd":
-            robots = [_read_usd(path, label, search)]
+            robots = [_read_usd(path, search)]
         else:
-            robots = _read_xml(path, label, kind, search)
+            robots = _read_xml(path, kind, search)
     except BadInput:
         raise
     except RecursionError:
@@ -133,12 +134,12 @@ def read_robots_here(path: Path, label: str, search: Sequence[Path] = ()) -> lis
 # ------------------------------------------------------------------------------------------------------------- URDF and SDF
 
 
-def _read_xml(path: Path, label: str, kind: str, search: Sequence[Path]) -> list[Robot]:
+def _read_xml(path: Path, kind: str, search: Sequence[Path]) -> list[Robot]:
     root = parse(path)
     models = [root] if root.tag == "robot" else [*root.iter("model")]
     robots = []
     for model in models:
-        robot, reading = Robot(label if len(models) == 1 else f"{label}: {model.get('name')}", kind), Reading()
+        robot, reading = Robot(kind, model.get("name", "") if len(models) > 1 else ""), Reading()
         frames = Description(path, model, search, reading)
         joints = {joint.child: joint for joint in frames.joints}
         names = [link.get("name", "") for link in model.findall("link")]
@@ -241,7 +242,7 @@ def _hull(points: Array, pose: Array) -> Array:
 # --------------------------------------------------------------------------------------------------------------------- MJCF
 
 
-def _read_mjcf(path: Path, label: str, search: Sequence[Path]) -> Robot:
+def _read_mjcf(path: Path, search: Sequence[Path]) -> Robot:
     """Return the bodies of an MJCF file. MuJoCo compiles a copy in which masses and inertias that it refuses are replaced."""
     mujoco, spec, _ = parse_mjcf(path, search)
     options, off = spec.compiler, {"balanceinertia": 0, "boundmass": 0, "boundinertia": 0, "settotalmass": -1, "fusestatic": 0}
@@ -268,7 +269,7 @@ def _read_mjcf(path: Path, label: str, search: Sequence[Path]) -> Robot:
         message = " ".join(str(error).removeprefix("Error: ").split())
         raise refuse(path, f"an error ({message})", "a file that MuJoCo compiles") from None
     mujoco.mj_kinematics(model, data := mujoco.MjData(model))
-    robot, names = Robot(label, "mjcf"), [""] + [body.name or f"body {number}" for number, body in enumerate(bodies)]
+    robot, names = Robot("mjcf"), [""] + [body.name or f"body {number}" for number, body in enumerate(bodies)]
     for number, body in enumerate(bodies):
         k = body.id
         R = _matrix(mujoco, model.body_iquat[k])
@@ -342,7 +343,7 @@ def _mjcf_shapes(mujoco: Any, model: Any, body: int) -> list[Shape]:
 # ---------------------------------------------------------------------------------------------------------------------- USD
 
 
-def _read_usd(path: Path, label: str, search: Sequence[Path]) -> Robot:
+def _read_usd(path: Path, search: Sequence[Path]) -> Robot:
     """Return the rigid bodies of a USD file. A body without its own mass and inertia has those of its shapes."""
     stage = Stage(path, search)
     names = {str(body.GetPath()): body for body in stage.bodies}
@@ -353,7 +354,7 @@ def _read_usd(path: Path, label: str, search: Sequence[Path]) -> Robot:
         if all(ends) and ends[0][0] in names and ends[1][0] in names and ends[1][0] not in parents:
             kind = joint.GetTypeName().removeprefix("Physics").removesuffix("Joint").lower()
             parents[ends[1][0]] = ends[0][0], kind
-    robot = Robot(label, "usd")
+    robot = Robot("usd")
     for name in _from_root(path, list(names), {child: parent for child, (parent, _) in parents.items()}):
         body, (pose, scale) = names[name], stage.pose(names[name])
         shapes, unread = _usd_shapes(stage, body)

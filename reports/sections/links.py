@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,7 @@ from ..document.model import Block, Cell, Emphasis, Grade, Paragraph, Row, Style
 if TYPE_CHECKING:
     from conservative.benchmarks.verification.finding import Verification
 
-HEADER = ("link", "verdict", "mistake", "what the file has", "what it does to the motion", "repair")
+HEADER = ("link", "verdict", "mistake", "what it does to the motion", "repair", "what the file has")
 NOTE = (
     "The links are compared with their own shapes, with their twins and with what a body can have, without an engine. "
     "The effect is computed for the link and all that is fixed to it, from the inertia of the file and the repaired one; "
@@ -36,7 +37,7 @@ def link_blocks(verifications: Sequence[Verification], brief: bool) -> list[Bloc
     if brief:
         doubtful.sort(key=lambda pair: ("wrong", "undecided", "not tested").index(pair[1].verdict))
         return filled(Table(header, [_row(*pair, several) for pair in doubtful], "Links that are not right"))
-    full = [*header[: -len(HEADER) + 2], "mass", "principal moments", *header[-len(HEADER) + 2 :]]
+    full = [*header, "mass", "principal moments, kg m^2"]
     files = _files(verifications) if several else None
     rows = [_row(*pair, several, full=True) for pair in sorted(findings, key=lambda pair: pair[1].verdict == "right")]
     return filled(files, Table(full, rows, "Links", Style.FILTERED), Paragraph(NOTE, Emphasis.NOTE))
@@ -57,7 +58,7 @@ def _row(subject: str, finding: Any, several: bool, full: bool = False) -> Row:
     mistakes = ", ".join(key for cause in finding.causes for key in cause.keys)
     sizes: list[str | Cell] = []
     if full:
-        moments = " ".join(f"{moment:.3g}" for moment in finding.moments)
-        sizes = [Cell(f"{finding.mass:.4g} kg" if finding.mass == finding.mass else DASH, value=finding.mass), moments or DASH]
-    texts = [text or DASH for text in (mistakes, finding.detail, finding.effect, finding.repair)]
-    return [*([subject] if several else []), finding.case or DASH, verdict, *sizes, *texts]
+        mass = DASH if math.isnan(finding.mass) else f"{finding.mass:.4g} kg"
+        sizes = [Cell(mass, value=finding.mass), " ".join(f"{moment:.3g}" for moment in finding.moments) or DASH]
+    texts = [text or DASH for text in (mistakes, finding.effect, finding.repair, finding.detail)]
+    return [*([subject] if several else []), finding.case or DASH, verdict, *texts, *sizes]

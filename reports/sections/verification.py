@@ -73,7 +73,7 @@ def build(verifications: Sequence[Verification], made: Mapping[str, str] | None 
 
     return Document(
         "conservative verify",
-        f"Verified: {', '.join(verification.subject for verification in verifications)}",
+        f"Verified: {named(verification.subject for verification in verifications)}",
         [*blocks(details, others, False), Paragraph(TERMS, Emphasis.NOTE)],
         brief=blocks(summary, [other for other in others if len(order) == 1 or other.verdict is not Verdict.RIGHT], True),
         data={
@@ -85,6 +85,13 @@ def build(verifications: Sequence[Verification], made: Mapping[str, str] | None 
         checks=[_check(verification.subject, finding) for verification in verifications for finding in verification.findings],
         failures=[f"{verification.sentence}." for verification in order if verification.verdict is Verdict.WRONG],
     )
+
+
+def named(subjects: Iterable[str]) -> str:
+    """Return the names of subjects for a title, at most `LISTED` of them."""
+    names = list(subjects)
+    more = len(names) - LISTED
+    return ", ".join(names) if more <= 1 else f"{', '.join(names[:LISTED])} and {more} more"
 
 
 def exit_code(verifications: Iterable[Verification]) -> int:

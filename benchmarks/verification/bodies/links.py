@@ -205,12 +205,11 @@ def judge(robot: Robot, subject: str) -> list[LinkFinding]:
     faults = {link.name: list(_faults(link, bodies[link.name], twin_of.get(link.name))) for link in robot.links}
     for pair in pairs:
         _compare_twins(pair, faults, bodies)
-    prefix = robot.file.removeprefix(subject).removeprefix(": ")
-    return [_finding(link, bodies[link.name], faults[link.name], subject, prefix) for link in robot.links]
+    return [_finding(link, bodies[link.name], faults[link.name], subject, robot.name) for link in robot.links]
 
 
-def _finding(link: RobotLink, body: Body, faults: Sequence[Fault], subject: str, prefix: str) -> LinkFinding:
-    name = f"{prefix}: {link.name}" if prefix else link.name
+def _finding(link: RobotLink, body: Body, faults: Sequence[Fault], subject: str, model: str) -> LinkFinding:
+    name = f"{model}: {link.name}" if model else link.name
     moments = tuple(np.linalg.eigvalsh(link.link.inertia).tolist())
     right = LinkFinding(subject, "links", name, Verdict.RIGHT, mass=link.link.mass, moments=moments)
     if not faults:

@@ -171,7 +171,7 @@ def findings(tmp_path, links, text=None, name="made.urdf"):
     """The findings on the links of a robot by name."""
     path = tmp_path / name
     path.write_text(text or urdf(links))
-    return {finding.case: finding for robot in read_robots_here(path, name) for finding in judge(robot, name)}
+    return {finding.case: finding for robot in read_robots_here(path) for finding in judge(robot, name)}
 
 
 # --------------------------------------------------------------------------------------------------------- forty made faults
@@ -505,7 +505,7 @@ def test_the_effect_of_each_mistake_of_the_catalogue_is_found(tmp_path, key):
     name = "right_thigh" if key == "twins differ" else "left_thigh"
     path = tmp_path / "m.urdf"
     path.write_text(urdf(biped()))
-    (robot,) = read_robots_here(path, "m.urdf")
+    (robot,) = read_robots_here(path)
     robot.links = [
         replace(link, link=mistake.change(link.link)) if link.name == name else link for link in robot.links
     ]  # fmt: skip
