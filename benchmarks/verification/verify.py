@@ -110,10 +110,10 @@ def models_below(folder: Path) -> Iterator[Path]:
 def is_model(path: Path) -> bool:
     """Return True if a file of XML is a whole model: a robot, a world or model of SDF, or MJCF with a body."""
     try:
-        text = path.read_bytes()
+        text = re.sub(rb"<!--.*?-->", b"", path.read_bytes(), flags=re.DOTALL)
     except OSError:
         return False
-    root = re.search(rb"<(\w+)", re.sub(rb"<!--.*?-->", b"", text, flags=re.DOTALL))
+    root = re.search(rb"<(\w+)", text)
     name = root[1] if root else b""
     whole = {b"robot": b"<link", b"sdf": b"<link", b"mujoco": b"<body"}
     return name in whole and whole[name] in text and b"<xacro:" not in text

@@ -141,7 +141,9 @@ def _read_xml(path: Path, kind: str, search: Sequence[Path]) -> list[Robot]:
     for model in models:
         robot, reading = Robot(kind, model.get("name", "") if len(models) > 1 else ""), Reading()
         frames = Description(path, model, search, reading)
-        joints = {joint.child: joint for joint in frames.joints}
+        joints: dict[str, Any] = {}
+        for joint in frames.joints:
+            joints.setdefault(joint.child, joint)  # the others close loops
         names = [link.get("name", "") for link in model.findall("link")]
         for name in _from_root(path, names, {child: joint.parent for child, joint in joints.items()}):
             robot.links.append(_xml_link(path, frames, name, joints.get(name), robot.links, search))

@@ -52,6 +52,8 @@ TWINS = (0.1, 0.25)
 """Relative difference of twins: undecided, wrong. Twins that are built differently have up to 0.16."""
 TURNED = 0.1
 """Relative difference of the inertias of twins with the same moments that shows a wrong sign of a product."""
+MATERIALS = "materials"
+"""What allows a density."""
 GRAVITY = 9.81
 """Acceleration of gravity, m/s^2."""
 
@@ -365,7 +367,16 @@ def _faults(link: RobotLink, body: Body, twin: tuple[Pair, bool] | None) -> Iter
         if (fault := _size(link, part, own, body, solid)) or (fault := _sign(link, part, own)):
             yield fault
     if fault := _centre(link, part, body):
-        yield fault
+        yield _unless_symbols(fault, body)
+
+
+def _unless_symbols(fault: Fault, body: Body) -> Fault:
+    """Return a fault as undecided if the shapes cannot hold the mass of the body: small spheres may be symbols."""
+    mass = sum(link.link.mass for link in body.members)
+    if body.hull is None or mass < DENSEST * body.hull.volume:
+        return fault
+    text = f"{fault.text}; but the shapes, whose hull would have {_rounded(mass / body.hull.volume)} kg/m^3, may be symbols"
+    return replace(fault, verdict=Verdict.UNDECIDED, text=text)
 
 
 def _hulls(link: RobotLink) -> list[Hull]:
@@ -403,7 +414,7 @@ def _impossible(
     if part.mass > 0 and not part.inertia.any():
         text = f"a mass of {part.mass:.4g} kg without inertia"
         return Fault("no inertia", text, math.nan, math.nan, "", "what a body can have", solid)
-    error = (moments[2] - moments[0] - moments[1]) / moments[2] if part.excess else -moments[0] / max(moments[2], 1e-300)
+    error = float((moments[2] - moments[0] - moments[1] if part.excess else -moments[0]) / np.abs(moments).max())
     text = f"{part.flaw}: {list_numbers(moments)} kg m^2"
     slips = list(_single_slips(link, part, hulls))
     if mirrored is not None and not mirrored.flaw and twin:
@@ -471,7 +482,7 @@ def _size(link: RobotLink, part: Piece, hulls: Sequence[Hull], body: Body, solid
     if not (small or large or slipped):
         doubt = Fault("inertia outside the shapes", text, far, FARTHEST[0], "times", "shapes", expected)
         return replace(doubt, verdict=Verdict.UNDECIDED) if far > FARTHEST[0] else None
-    error, allowed, unit, by = (density, DENSEST, "kg/m^3", "materials") if small else (far, FARTHEST[0], "times", "shapes")
+    error, allowed, unit, by = (density, DENSEST, "kg/m^3", MATERIALS) if small else (far, FARTHEST[0], "times", "shapes")
     if large and (moved := _about_the_origin(part, hulls)):
         repair = "subtract the term of the parallel axis theorem: the inertia is about the origin of the link"
         return Fault("inertia moved twice", text, error, allowed, unit, by, moved, repair)

@@ -269,6 +269,18 @@ def test_what_is_unusual_but_right_has_no_finding(tmp_path):
     assert "does not change the motion" in found["point"].detail
 
 
+def test_shapes_that_cannot_hold_the_mass_decide_nothing(tmp_path):
+    links = arm()
+    made = links["upper_arm"].filled()
+    symbol = ((0.01, 0.01, 0.01), (0, 0, 0), (0, 0, 0))
+    links["upper_arm"] = replace(made, boxes=(symbol,))
+    found = findings(tmp_path, links)["upper_arm"]
+    assert found.verdict is Verdict.UNDECIDED
+    assert "symbols" in found.detail
+    links["upper_arm"] = replace(made, boxes=((4.0 * np.array(symbol[0]), *symbol[1:]),), mass=0.1, inertia=made.inertia / 40)
+    assert findings(tmp_path, links)["upper_arm"].verdict is Verdict.WRONG
+
+
 def test_an_impossible_inertia_of_a_part_that_hardly_matters_is_wrong_because_engines_refuse_it(tmp_path):
     links = arm()
     links["camera"] = replace(links["camera"], mass=0.05, inertia=1e-6 * np.diag([1.0, 1.0, 3.5]))
