@@ -16,7 +16,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from conservative.attitude import Array
-from conservative.errors import BadInput
+from conservative.errors import BadInput, MissingEngine, MissingExtra
 
 from ..worker.calls import python_worker, run_within
 from ..worker.client import EngineCrashed, EngineTimeout
@@ -86,18 +86,20 @@ class Robot:
 
 def read_robots(
     paths: Sequence[Path], search: Sequence[Path] = (), tell: Callable[[float, str], object] = lambda share, what: None
-) -> list[list[Robot] | BadInput]:
-    """Return the models of each file, or why a file cannot be read. Files are read in a worker with limits.
+) -> list[list[Robot] | Exception]:
+    """Return the models of each file, or why a file cannot be read: `BadInput`, `MissingEngine` or `MissingExtra`.
+
+    Files are read in a worker with limits.
 
     `tell` is called with the share that is done and the name of the next file.
     """
-    worker, results = python_worker({"OPENBLAS_NUM_THREADS": "1"}, MEMORY), list[list[Robot] | BadInput]()
+    worker, results = python_worker({"OPENBLAS_NUM_THREADS": "1"}, MEMORY), list[list[Robot] | Exception]()
     try:
         for number, path in enumerate(paths):
             tell(number / len(paths), path.name)
             try:
                 results.append(run_within(SECONDS, partial(read_robots_here, path, search), process=worker))
-            except BadInput as error:
+            except (BadInput, MissingEngine, MissingExtra) as error:
                 results.append(error)
             except (EngineCrashed, EngineTimeout) as failure:
                 allowed = f"a file that is read within {SECONDS:g} s and {MEMORY / 2**30:g} GiB"
@@ -108,7 +110,7 @@ def read_robots(
 
 
 def read_robots_here(path: Path, search: Sequence[Path] = ()) -> list[Robot]:
-    """Return the models of a file as `read_robots`, in this process. Raise `BadInput`."""
+    """Return the models of a file as `read_robots`, in this process. Raise `BadInput`, `MissingEngine` or `MissingExtra`."""
     kind = kind_of(path)
     allowed = "elements and numbers of its format"
     try:
@@ -118,7 +120,7 @@ def read_robots_here(path: Path, search: Sequence[Path] = ()) -> list[Robot]:
             robots = [_read_usd(path, search)]
         else:
             robots = _read_xml(path, kind, search)
-    except BadInput:
+    except (BadInput, MissingEngine, MissingExtra):
         raise
     except RecursionError:
         raise refuse(path, "frames that refer to each other in a circle", "frames that lead to the model") from None
@@ -126,6 +128,8 @@ def read_robots_here(path: Path, search: Sequence[Path] = ()) -> list[Robot]:
         raise refuse(path, str(error), allowed) from None
     except KeyError as error:
         raise refuse(path, f"a reference to {error}, which is not there", allowed) from None
+    except Exception as error:
+        raise refuse(path, f"something that cannot be read ({type(error).__name__})", allowed) from None
     if not any(robot.links for robot in robots):
         raise refuse(path, "no link", "a model with links")
     return robots

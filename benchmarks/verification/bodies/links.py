@@ -115,21 +115,22 @@ def verify_links(
 
     Raises
     ------
-    BadInput
+    BadInput, MissingEngine, MissingExtra
         The only file cannot be read. One of several files that cannot be read is not tested.
     """
     paths = list(dict.fromkeys(files))
     read = read_robots(paths, search, tell)
-    if len(read) == 1 and isinstance(read[0], BadInput):
+    if len(read) == 1 and isinstance(read[0], Exception):
         raise read[0]
     unique = len({path.name for path in paths}) == len(paths)
     names = [path.name if unique else str(path) for path in paths]
     return [_verify(name, robots) for name, robots in zip(names, read, strict=True)]
 
 
-def _verify(name: str, robots: Sequence[Robot] | BadInput) -> Verification:
-    if isinstance(robots, BadInput):
-        finding = LinkFinding(name, "links", "", Verdict.NOT_TESTED, detail=f"the file has {reason(robots)}")
+def _verify(name: str, robots: Sequence[Robot] | Exception) -> Verification:
+    if isinstance(robots, Exception):
+        text = f"the file has {reason(robots)}" if isinstance(robots, BadInput) else str(robots)
+        finding = LinkFinding(name, "links", "", Verdict.NOT_TESTED, detail=text)
         return Verification(name, "model file", (finding,), "it cannot be read")
     findings = [finding for robot in robots for finding in judge(robot, name)]
     notes = [note for robot in robots for note in _notes(robot)]
@@ -259,9 +260,9 @@ def _harmless(link: RobotLink, body: Body, fault: Fault) -> bool:
 
 def _accelerations(inertia: Array, expected: Array) -> tuple[float, float]:
     """Return the smallest and largest ratio of angular accelerations under one torque, of a body and of the expected one."""
-    root = np.linalg.cholesky(expected)
-    inverse = np.linalg.inv(root)
-    values = np.linalg.eigvalsh(inverse @ inertia @ inverse.T)
+    moments, axes = np.linalg.eigh(expected)
+    inverse = axes / np.sqrt(moments)
+    values = np.linalg.eigvalsh(inverse.T @ inertia @ inverse)
     return float(1 / values[-1]), float(1 / values[0]) if values[0] > 0 else math.inf
 
 
@@ -283,13 +284,12 @@ def _motion(link: RobotLink, body: Body, fault: Fault) -> str:
         return "a torque about one axis turns it the other way, and its energy has no lower bound"
     if not moments[0] > 1e-9 * moments[2]:
         return "it accelerates without limit under a torque about one axis"
+    no_body = "no body moves like this: its free motion is the motion of no rigid body"
     if fault.expected is None:
-        return (
-            "no body moves like this: its free motion is the motion of no rigid body"
-            if fault.key == "impossible inertia"
-            else ""
-        )
+        return no_body if fault.key == "impossible inertia" else ""
     then = body.whole(link, fault.expected)
+    if then.flaw:  # another link of the body is impossible
+        return no_body
     texts = []
     if max(whole.mass / then.mass, then.mass / whole.mass) > 1.5:
         fast = then.mass > whole.mass
@@ -414,7 +414,7 @@ def _impossible(
     if part.mass > 0 and not part.inertia.any():
         text = f"a mass of {part.mass:.4g} kg without inertia"
         return Fault("no inertia", text, math.nan, math.nan, "", "what a body can have", solid)
-    error = float((moments[2] - moments[0] - moments[1] if part.excess else -moments[0]) / np.abs(moments).max())
+    error = float((moments[2] - moments[0] - moments[1] if part.excess else -moments[0]) / (np.abs(moments).max() or 1.0))
     text = f"{part.flaw}: {list_numbers(moments)} kg m^2"
     slips = list(_single_slips(link, part, hulls))
     if mirrored is not None and not mirrored.flaw and twin:
@@ -532,8 +532,8 @@ def is_placeholder(inertia: Array) -> bool:
     moments = np.diag(inertia)
     if np.abs(inertia - np.diag(moments)).max() > 0 or not (moments > 0).all():
         return False
-    digits = {f"{moment:.12e}".partition("e")[0].rstrip("0").rstrip(".") for moment in moments}
-    return len(set(moments.tolist())) < 3 and all(len(digit) == 1 for digit in digits)
+    leading = moments / 10.0 ** np.floor(np.log10(moments) + 1e-9)
+    return len(set(moments.tolist())) < 3 and bool(np.abs(leading - np.rint(leading)).max() < 1e-9)
 
 
 def _sign(link: RobotLink, part: Piece, hulls: Sequence[Hull]) -> Fault | None:
