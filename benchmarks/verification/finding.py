@@ -79,9 +79,10 @@ class Finding:
     verdict
         Right, wrong, undecided or not tested.
     error, allowed, unit
-        Largest error and the largest error that is allowed, rad or relative; nan if nothing was measured.
+        Largest error and the largest error that is allowed, rad, relative, a factor ("times") or a density, kg/m^3; nan if
+        nothing was measured.
     by
-        What decides the allowed error: digits, noise, order, rounding, the option --error.
+        What decides the allowed error: digits, noise, order, rounding, shapes, the option --error.
     causes
         Mistakes that explain the error; several if they explain it equally well, none if no mistake of the catalogue does.
     detail
@@ -155,6 +156,7 @@ CHECKS: Mapping[str, str] = MappingProxyType(
         "repeatability": "a second run has the same bits",
         "pairs": "two descriptions of one motion move equally",
         "times": "measured times are honest",
+        "links": "mass and inertia of the links of a model file fit its shapes, their twins, and what a body can have",
         "bodies": "engines load the body that a model file describes",
     }
 )
@@ -238,7 +240,8 @@ class Verification:
         """The verdict in one sentence."""
         if self.kind == "recordings":  # the reason says which one is wrong
             return f"{self.verdict}{self._standing}: {self.reason}"
-        subject = f"The loading of {self.subject}" if self.kind == "model file" else self.subject
+        loaded = self.kind == "model file" and all(finding.check == "bodies" for finding in self.findings)
+        subject = f"The loading of {self.subject}" if loaded else self.subject
         return f"{subject} is {self.verdict}{self._standing}" + (f": {self.reason}" if self.reason else "")
 
     @property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -45,7 +46,7 @@ CHECKS_OF: dict[Kind, tuple[str, ...]] = {
     Kind.METHOD: ("motions", "order", "repeatability", "pairs"),
     Kind.ENGINE: ("motions", "order", "repeatability", "pairs"),
     Kind.PROGRAM: ("protocol", "motions", "order", "repeatability", "pairs", "times"),
-    Kind.MODEL: ("bodies",),
+    Kind.MODEL: ("links", "bodies"),
 }
 """Checks of each kind of subject, in their order."""
 MOTION_CHECKS = ("motions", "order", "repeatability")
@@ -99,13 +100,41 @@ def _words(text: str) -> list[str]:
         return [text]
 
 
+LAYERS = (".usd", ".usda", ".usdc", ".usdz")
+"""Suffixes of files that may be parts of other files, so that a library is not searched for them."""
+
+
+def models_below(folder: Path) -> Iterator[Path]:
+    """Yield the model files of XML in the folders below a folder, by name; other XML and parts of models are left out."""
+    for path in sorted(folder.rglob("*")):
+        if path.is_file() and path.suffix.lower() in set(MODELS) - set(LAYERS) and is_model(path):
+            yield path
+
+
+def is_model(path: Path) -> bool:
+    """Return True if a file of XML is a whole model: a robot, a world or model of SDF, or MJCF with a body."""
+    try:
+        text = re.sub(rb"<!--.*?-->", b"", path.read_bytes(), flags=re.DOTALL)
+    except OSError:
+        return False
+    root = re.search(rb"<(\w+)", text)
+    name = root[1] if root else b""
+    whole = {b"robot": b"<link", b"sdf": b"<link", b"mujoco": b"<body"}
+    return name in whole and whole[name] in text and b"<xacro:" not in text
+
+
 def expand(texts: Sequence[str]) -> list[Subject]:
-    """Return the subjects of texts; a folder stands for its recordings and model files, by name. Raise `BadInput`."""
+    """Return the subjects of texts. Raise `BadInput`.
+
+    A folder stands for its recordings and model files, by name. Without any, it is a library and stands for the model files in
+    the folders below it.
+    """
     subjects = []
     for text in texts:
         if (folder := Path(text)).is_dir():
             endings = (*ENDINGS, *MODELS)
             files = sorted(path for path in folder.iterdir() if path.is_file() and path.name.lower().endswith(endings))
+            files = files or list(models_below(folder))
             if not files:
                 raise BadInput("subject", f"the folder {text!r}", f"a folder with files that end in {', '.join(endings)}")
             subjects += [Subject(str(path), kind_of(str(path)), path, in_folder=True) for path in files]
@@ -142,7 +171,7 @@ def verify(
     body
         Scene, its name or its file, for recordings.
     engines
-        Engines that load model files; by default those that are installed.
+        Engines that load model files; by default those that are installed. Without one, only links are checked.
     only
         Names of checks, see `finding.CHECKS`; by default all that fit a subject.
     pairs
@@ -201,11 +230,11 @@ def verify(
     if unused := set(only) - {check for kind in kinds for check in CHECKS_OF[kind]}:
         allowed = ", ".join(dict.fromkeys(check for kind in kinds for check in CHECKS_OF[kind]))
         raise BadInput("only", repr(sorted(unused)[0]), f"checks of {' and '.join(sorted(kinds))}: {allowed}")
-    if pairs and only and "pairs" not in only:
-        raise BadInput("pairs", f"{', '.join(pairs)!r} without the check of pairs", "pairs in --only, or no --only")
+    _refuse_left_out(only, bodies=("engines", engines), pairs=("pairs", pairs))
     _require_motions(seed, only, record or known)
     with _known_errors(record, known, only, bool(pairs)) as compare:
-        return compare(_verify_all(expanded, methods, body, engines, only, pairs, search, start, error, seed, tell, reading))
+        folders = [*search, *_packages(listed)]
+        return compare(_verify_all(expanded, methods, body, engines, only, pairs, folders, start, error, seed, tell, reading))
 
 
 @contextmanager
@@ -250,9 +279,10 @@ def _verify_all(
 ) -> list[Verification]:
     results: list[Verification] = []
     if files := [subject.path for subject in expanded if subject.kind is Kind.MODEL and subject.path]:
-        from .bodies import verify_files
+        from .bodies import verify_models
 
-        results += verify_files(files, engines, tell, search)
+        checks = [check for check in CHECKS_OF[Kind.MODEL] if not only or check in only]
+        results += verify_models(files, checks, engines, tell, search)
     recordings = [subject for subject in expanded if subject.kind is Kind.RECORDING]
     if tables := [recording.path for recording in recordings if recording.path]:
         together = len(tables) == 2 and not any(recording.in_folder for recording in recordings)
@@ -265,6 +295,13 @@ def _verify_all(
 
             results += [_verify_method(method, subject.kind, only, pairs, tell, seed) for method in select([subject.text])]
     return results + [_verify_method(method, Kind.METHOD, only, pairs, tell, seed) for method in methods]
+
+
+def _packages(subjects: Sequence[Any]) -> list[Path]:
+    """Return the folders that are subjects, and the folders of ROS packages in them, for `package://`."""
+    folders = [Path(text) for text in subjects if isinstance(text, str | os.PathLike) and Path(text).is_dir()]
+    inside = [file.parent.parent for folder in folders for file in sorted(folder.rglob("package.xml")) if file.parent != folder]
+    return list(dict.fromkeys([*folders, *inside]))
 
 
 def _require_motions(seed: int | None, only: Sequence[str], known: str | os.PathLike[str] | None) -> None:
@@ -359,3 +396,11 @@ def _refuse_unused(kinds: set[Kind], **options: Any) -> None:
         users = USED_BY.get(name, (Kind.RECORDING,))
         if value not in (None, (), [], "") and not kinds & set(users):
             raise BadInput(name, "an option that no subject uses", f"a subject that is a {' or a '.join(users)}")
+
+
+def _refuse_left_out(only: Sequence[str], **options: tuple[str, Sequence[str]]) -> None:
+    """Raise `BadInput` for an option with names that belongs to a check, by the name of the check, which is left out."""
+    for check, (name, names) in options.items():
+        if names and only and check not in only:
+            got = f"{', '.join(names)!r} without the check of {check}"
+            raise BadInput(name, got, f"{check} in --only, or no --only")

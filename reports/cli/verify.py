@@ -41,10 +41,11 @@ FILES = {
     "verify.md": "# Verified: ",
     "verify.json": '{\n  "verified": ',
     "verify.csv": "subject,check,case",
+    "verify.html": "<title>conservative verify",
     "errors.csv": "t,quantity,value",
     "errors.svg": SVG_MARK,
 }
-"""The files of `--out`, and how each begins. Only a recording has errors over time."""
+"""The files of `--out`, and how each begins. Only model files have a page, and only a recording has errors over time."""
 MARK = "# Known errors on exact motions."
 """The beginning of a file of known errors (`known.MARK`, which `--help` does not import)."""
 LISTS = ("only", "pairs", "engines")
@@ -67,6 +68,7 @@ LISTS = ("only", "pairs", "engines")
         "conservative verify ./my_engine --record known.txt              its errors are known, later ones fail:",
         "conservative verify ./my_engine --known known.txt",
         "conservative verify my_robot.urdf --engines mujoco,drake        do they load the body that the file describes?",
+        "conservative verify robots --only links --out page              are masses and inertias of a library plausible?",
         "conservative verify mujoco --only pairs --scripts scripts       a script for each pair that differs",
         "conservative verify flight.csv --body brick_flip --euler zyx --rates world --error 1e-3 --json",
     ),
@@ -108,7 +110,8 @@ LISTS = ("only", "pairs", "engines")
 @error_option("Recordings: allowed error, rad, or relative to the largest rate.  [default: from digits and noise]")
 @names_option(
     "only",
-    "Methods, engines, programs: motions, order, repeatability, pairs, and for programs protocol, times.  [default: all]",
+    "Methods, engines, programs: motions, order, repeatability, pairs, and for programs protocol, times. Model files: links, "
+    "bodies.  [default: all]",
     "CHECKS",
 )
 @names_option("pairs", "Engines and programs: pairs of descriptions to compare.  [default: all]")
@@ -121,7 +124,7 @@ LISTS = ("only", "pairs", "engines")
 @click.option("--scripts", type=FilePath(), help="Folder for a script of each pair that differs, in the engine's own language.")
 @names_option(
     "engines",
-    "Model files: engines or programs that load them.  [default: the installed engines]",
+    "Model files: engines or programs that load them.  [default: the installed engines; without one, only links are checked]",
     "E,F",
     completion.engine_lists,
 )
@@ -144,7 +147,11 @@ LISTS = ("only", "pairs", "engines")
 @click.option("--junit", type=Output('name="conservative verify"'), help="Write a JUnit report.")
 @click.option("--markdown", type=Output(FILES["verify.md"]), help="Write the tables as Markdown.")
 @click.option("--csv", type=Output(FILES["verify.csv"]), help="Write the findings as CSV.")
-@option("out", f"Write {', '.join(FILES)} into this folder; the last two only for a recording.", type=Output(FILES))
+@option(
+    "out",
+    f"Write {', '.join(FILES)} into this folder; the page only for model files, errors only for a recording.",
+    type=Output(FILES),
+)
 @picture_option
 @click.pass_context
 def verify(
@@ -164,8 +171,9 @@ def verify(
 
     A SUBJECT is a recording (CSV or JSON lines), an engine with a version or a setting, a method of this package, a program
     (its name, its file, or a quoted command line), a model file (URDF, SDF, MJCF, USD), or a folder of recordings or of model
-    files. Two recordings are also compared with each other. With --engines and no SUBJECT, engines load the small model files
-    of this package, each of which tests one rule of a format.
+    files. A folder without such files stands for the models in the folders below it. Two recordings are also compared with each
+    other. The links of model files are checked without an engine. With --engines and no SUBJECT, engines load the small model
+    files of this package, each of which tests one rule of a format.
 
     The exit code is 0 if all subjects are right, 1 if one is wrong, and 3 if one is undecided or not tested. With --known, it
     is 1 only if an error is larger than in the file, has another mistake, or is new. If a motion changed, the last line is a
@@ -188,10 +196,16 @@ def verify(
     kinds_in_order = [subject.kind for subject in expand(names)]
     kinds, alone = set(kinds_in_order), kinds_in_order == [Kind.RECORDING]
     options = used({"picture": picture, "scripts": scripts, **values}, kinds)
+    if not subjects:  # the masses of the small files are no robot's
+        options.setdefault("only", ["bodies"])
     if picture is not None and not alone:
         raise BadInput("picture", f"{len(kinds_in_order)} subjects", "one recording")
     drawn = alone and find_spec("pandas") is not None and find_spec("altair") is not None
     left_out = [] if drawn else ["errors.svg"] if alone else ["errors.svg", "errors.csv"]
+    if Kind.MODEL not in kinds:
+        left_out.append("verify.html")
+    elif out is not None:
+        require_extra("a page of model files", "report", "jinja2", "itables")
     outputs = {"junit": junit, "markdown": markdown, "csv": csv, "picture": picture}
     title = f"verifying {', '.join(names)}"
     with output_files(out, [name for name in FILES if name not in left_out], **outputs) as write, progress(title) as tell:

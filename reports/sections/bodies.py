@@ -15,7 +15,10 @@ def body_blocks(verifications: Sequence[Verification]) -> list[Block]:
     """Return the blocks for verifications of model files: the verdicts, what is not right, the bodies by all readers, notes."""
     from conservative.benchmarks.verification.finding import Verdict
 
-    findings = [finding for verification in verifications for finding in verification.findings]
+    findings = [finding for verification in verifications for finding in verification.findings if finding.check == "bodies"]
+    notes = [Item(note, verification.subject) for verification in verifications for note in verification.notes]
+    if not findings:
+        return filled(Items(notes))
     engines = list(dict.fromkeys(finding.subject for finding in findings))
     verdicts = {(finding.case, finding.subject): finding.verdict for finding in findings}
     cases = list(dict.fromkeys(finding.case for finding in findings))
@@ -36,7 +39,6 @@ def body_blocks(verifications: Sequence[Verification]) -> list[Block]:
         if (body := details.get((finding.case, finding.subject))) and (body.seen or finding in undecided)
     ]
     explained = [finding for finding in right if finding.detail]
-    notes = [Item(note, verification.subject) for verification in verifications for note in verification.notes]
     return filled(
         Paragraph(lead, Emphasis.LEAD),
         Table(["body", *engines], rows),

@@ -14,6 +14,7 @@ from conservative.benchmarks.verification.finding import EXIT_CODES, Cause, Find
 from ..document.cells import DASH, bound, listed
 from ..document.model import Block, Cell, Check, Document, Emphasis, Grade, Item, Items, Paragraph, Row, Section, Table, filled
 from .bodies import body_blocks
+from .links import link_blocks
 from .recording import described, recording_blocks, two_blocks
 
 Key = TypeVar("Key")
@@ -77,18 +78,22 @@ def build(verifications: Sequence[Verification], made: Mapping[str, str] | None 
     before = described(order[0]) if len(order) == 1 and order[0].kind == "recording" else []
     lead = filled(*before, Paragraph(_sentence(order), Emphasis.LEAD), Items(sentences) if len(order) > 1 else None)
 
-    def blocks(make: Callable[[Verification], list[Block]], shown: Sequence[Verification]) -> list[Block]:
+    def blocks(make: Callable[[Verification], list[Block]], shown: Sequence[Verification], brief: bool) -> list[Block]:
         parts = [
-            *([("Model files", filled(_standings(models), *body_blocks(models)))] if models else []),
+            *(
+                [("Model files", filled(_standings(models), *link_blocks(models, brief), *body_blocks(models)))]
+                if models
+                else []
+            ),
             *((verification.subject, make(verification)) for verification in shown),
         ]
         return [*lead, *(parts[0][1] if len(order) == 1 or not others else filled(*(Section(*part) for part in parts)))]
 
     return Document(
         "conservative verify",
-        f"Verified: {', '.join(verification.subject for verification in verifications)}",
-        [*blocks(details, others), Paragraph(TERMS, Emphasis.NOTE)],
-        brief=blocks(summary, [other for other in others if len(order) == 1 or _has_news(other)]),
+        f"Verified: {named(verification.subject for verification in verifications)}",
+        [*blocks(details, others, False), Paragraph(TERMS, Emphasis.NOTE)],
+        brief=blocks(summary, [other for other in others if len(order) == 1 or _has_news(other)], True),
         data={
             "verified": [verification.subject for verification in verifications],
             "verdict": order[0].verdict,
@@ -98,6 +103,13 @@ def build(verifications: Sequence[Verification], made: Mapping[str, str] | None 
         checks=[_check(verification.subject, finding) for verification in verifications for finding in verification.findings],
         failures=[f"{verification.sentence}." for verification in order if verification.exit_code == EXIT_CODES[Verdict.WRONG]],
     )
+
+
+def named(subjects: Iterable[str]) -> str:
+    """Return the names of subjects for a title, at most `LISTED` of them."""
+    names = list(subjects)
+    more = len(names) - LISTED
+    return ", ".join(names) if more <= 1 else f"{', '.join(names[:LISTED])} and {more} more"
 
 
 def exit_code(verifications: Iterable[Verification]) -> int:

@@ -127,7 +127,7 @@ def verify_files(
     """
     names = dict.fromkeys(str(registry.read_name(name, "engines", settings=False)) for name in engines)
     paths = list(dict.fromkeys(files)) or sorted(path for path in CATALOGUE.iterdir() if path.suffix not in (".obj", ".md"))
-    installed = {environment.engine for environment in list_environments()} | {name for name in LOCAL if find_spec(name)}
+    installed = installed_loaders()
     with ExitStack() as stack:
         folder = Path(stack.enter_context(TemporaryDirectory()))
         models = read_files(paths, folder, search)
@@ -148,6 +148,12 @@ def verify_files(
                 loaded[model.label].append(program.check(model))
         loaded = {model.label: weigh_votes(model, loaded[model.label]) for model in models}
     return [_join(file, list(same), loaded) for file, same in groupby(models, key=lambda model: model.file)]
+
+
+def installed_loaders() -> set[str]:
+    """Return the names of the installed engines that have a loader."""
+    installed = {environment.engine for environment in list_environments()} | {name for name in LOCAL if find_spec(name)}
+    return installed.intersection(LOADERS)
 
 
 def _join(file: str, models: list[Model], loaded: dict[str, list[tuple[Finding, LoadedBody]]]) -> Verification:

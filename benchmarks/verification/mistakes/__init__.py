@@ -20,7 +20,7 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
 from .attitudes import DRIFTS, RULES
-from .bodies import FITTED, LOADED
+from .bodies import FILES, FITTED, LOADED
 from .equations import EQUATIONS
 from .habits import HABITS, OTHER_ROWS, PART_STANDSTILLS, ROWS, STANDSTILLS
 from .mistake import Mistake
@@ -45,5 +45,6 @@ BY_KEY = table_of([
     *READINGS, *TIMES, *ROW_TIMES, *SCENES, DIGITS, *BODIES, *EQUATIONS, *INTEGRATORS, *RULES, *DRIFTS,
     *HABITS, *STANDSTILLS, *PART_STANDSTILLS, *ROWS, *OTHER_ROWS, *RESAMPLED, *FITTED,
     *(mistake for mistake in LOADED if mistake.key not in {scene_mistake.key for scene_mistake in SCENES}),
+    *(mistake for mistake in FILES if mistake.key not in {other.key for other in (*SCENES, *LOADED)}),
 ])  # fmt: skip
-"""All mistakes by key. Dropped products of inertia are in `SCENES` and in `LOADED`: one mistake with an effect on each kind."""
+"""All mistakes by key. Products of inertia are in `SCENES`, `LOADED` and `FILES`: one mistake with an effect on each kind."""

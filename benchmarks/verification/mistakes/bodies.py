@@ -42,6 +42,14 @@ class FittedBodyMistake(Mistake):
     fit: Callable[[Piece, Piece], tuple[Mapping[str, float], Piece]]
 
 
+@dataclass(frozen=True)
+class FileMistake(Mistake):
+    """A mistake of the author of a model file in one link: the change of a right link, planted with given numbers."""
+
+    kind: ClassVar[str] = "bodies"
+    change: Callable[..., Link]
+
+
 def _all(change: Callable[[Link], dict[str, Any]]) -> Callable[[Links], Links]:
     return lambda links: [replace(link, **change(link)) for link in links]
 
@@ -253,3 +261,82 @@ FITTED: tuple[FittedBodyMistake, ...] = (
     ),
 )
 """Mistakes whose numbers follow from the body that an engine has, those with fewer numbers first."""
+
+
+def _with_inertia(link: Link, change: Callable[[Array], Array]) -> Link:
+    return replace(link, inertia=change(link.inertia))
+
+
+def _beyond(inertia: Array) -> Array:
+    """Return an inertia whose largest moment exceeds the sum of the others by a fifth."""
+    moments, axes = np.linalg.eigh(inertia)
+    moments[2] = 1.2 * (moments[0] + moments[1])
+    return (axes * moments) @ axes.T
+
+
+def _sign_of_products(inertia: Array) -> Array:
+    return 2 * np.diag(np.diag(inertia)) - inertia
+
+
+FILES: tuple[FileMistake, ...] = (
+    FileMistake(
+        "impossible inertia",
+        "No body has this inertia",
+        lambda link: _with_inertia(link, _beyond),
+        remedy="compute it again from the drawing, about the centre of mass and in the axes of the inertial frame",
+    ),
+    FileMistake(
+        "placeholder inertia",
+        "The inertia is a placeholder",
+        lambda link, moment=0.001: _with_inertia(link, lambda inertia: moment * np.eye(3)),
+        remedy="compute it from the drawing or from the shapes at this mass",
+    ),
+    FileMistake(
+        "decimal slip",
+        "A number is too large or too small by a power of ten, which 10^{power:.0f} repairs",
+        lambda link, power=-1.0: _with_inertia(link, lambda inertia: inertia / 10.0**power),
+        numbers=(Number("power"),),
+    ),
+    FileMistake(
+        "inertia too small",
+        "The inertia is smaller than any mass distribution in these shapes has, or than any material allows",
+        lambda link, factor=0.001: _with_inertia(link, lambda inertia: factor * inertia),
+        remedy="check the units (kg, m) and the mass",
+    ),
+    FileMistake(
+        "inertia outside the shapes",
+        "The radius of gyration is outside the shapes",
+        lambda link, factor=50.0: _with_inertia(link, lambda inertia: factor * inertia),
+        remedy="check if the inertia is about the centre of mass, and its units (kg, m)",
+    ),
+    FileMistake(
+        "centre of mass outside the shapes",
+        "The centre of mass is outside the shapes",
+        lambda link, distance=1.0: replace(link, frame=make_pose((distance, 0, 0)) @ link.frame),
+        remedy="check the axes and the unit (m) of the centre of mass",
+    ),
+    FileMistake(
+        "twins differ",
+        "Left and right differ",
+        lambda link, factor=2.0: replace(link, mass=factor * link.mass),
+    ),
+    FileMistake(
+        "no inertial element",
+        "A body that a joint moves has no mass",
+        lambda link: replace(link, mass=0.0, inertia=np.zeros((3, 3))),
+        remedy="add mass and inertia, or fix the joint",
+    ),
+    FileMistake(
+        "no inertia",
+        "The inertia is lost",
+        lambda link: replace(link, inertia=np.zeros((3, 3))),
+        remedy="compute it from the drawing or from the shapes at this mass",
+    ),
+    FileMistake(
+        "sign of the products of inertia",
+        next(scene.sentence for scene in SCENES if scene.key == "sign of the products of inertia"),
+        lambda link: _with_inertia(link, _sign_of_products),
+        remedy="some programs write products with the other sign: the tensor has minus the integral of x y",
+    ),
+)
+"""Known mistakes of authors of model files. The last two are mistakes of loaders and scenes as well."""

@@ -1,0 +1,528 @@
+"""The links of model files: faults that are planted into made robots are found and named, and right robots have no finding."""
+
+import json
+import re
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from scipy.spatial.transform import Rotation
+
+from conservative.benchmarks.verification.bodies import models
+from conservative.benchmarks.verification.bodies.links import judge
+from conservative.benchmarks.verification.bodies.solids import density_of, hull_of, reach
+from conservative.benchmarks.verification.bodies.twins import other_side
+from conservative.benchmarks.verification.finding import Verdict
+from conservative.benchmarks.verification.mistakes import BY_KEY
+from conservative.benchmarks.verification.mistakes.bodies import FILES
+from conservative.benchmarks.verification.verify import verify
+from conservative.errors import BadInput
+from conservative.references.model_files import robot_links
+from conservative.references.model_files.collada import read_collada
+from conservative.references.model_files.files import Unread
+from conservative.references.model_files.pieces import Piece
+from conservative.references.model_files.robot_links import read_robots_here
+from conservative.reports.cli.main import main
+
+from ...sampling import sampled
+
+# ------------------------------------------------------------------------------------------------------------- made robots
+
+
+@dataclass(frozen=True)
+class Made:
+    """A link of boxes (size, place, angles about x, y, z) with uniform density, and the joint that it is on."""
+
+    mass: float
+    boxes: tuple
+    parent: str = ""
+    at: tuple = (0, 0, 0)
+    turn: tuple = (0, 0, 0)
+    joint: str = "revolute"
+    com: np.ndarray = None
+    inertia: np.ndarray = None
+    inertial: bool = True
+    shapes: bool = True
+    extra: str = field(default="", compare=False)
+
+    def filled(self):
+        """The link with the centre of mass and the inertia of its boxes, unless it has others."""
+        volumes = np.array([np.prod(size) for size, _, _ in self.boxes])
+        masses = self.mass * volumes / volumes.sum()
+        places = np.array([place for _, place, _ in self.boxes], float)
+        com = masses @ places / self.mass
+        J = np.zeros((3, 3))
+        for m, (size, place, angles) in zip(masses, self.boxes, strict=True):
+            a, b, c = np.square(size)
+            R = Rotation.from_euler("xyz", angles).as_matrix()
+            d = np.array(place) - com
+            J += R @ np.diag([b + c, a + c, a + b]) @ R.T * m / 12 + m * (d @ d * np.eye(3) - np.outer(d, d))
+        return replace(
+            self,
+            com=com if self.com is None else np.array(self.com),
+            inertia=J if self.inertia is None else np.array(self.inertia),
+        )
+
+
+def mirrored(made, **changes):
+    """The link on the other side of the plane y = 0, with axes that are parallel to the first one's."""
+    boxes = tuple((s, (x, -y, z), (-a, b, -c)) for s, (x, y, z), (a, b, c) in made.boxes)
+    x, y, z = made.at
+    return replace(made, boxes=boxes, at=(x, -y, z), **changes)
+
+
+def triple(values):
+    return " ".join(repr(float(value)) for value in values)
+
+
+def urdf(links):
+    """The file of a robot in URDF."""
+    parts = []
+    for name, link in links.items():
+        made = link.filled()
+        shapes = [
+            f'<{tag}><origin xyz="{triple(place)}" rpy="{triple(angles)}"/>'
+            f'<geometry><box size="{triple(size)}"/></geometry></{tag}>'
+            for tag in ("visual", "collision") for size, place, angles in made.boxes
+        ]  # fmt: skip
+        pairs = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2))
+        numbers = " ".join(f'i{key}="{float(made.inertia[i, j])!r}"' for key, i, j in pairs)
+        inertial = (
+            f'<inertial><origin xyz="{triple(made.com)}"/><mass value="{float(made.mass)!r}"/><inertia {numbers}/></inertial>'
+        )
+        parts.append(f'<link name="{name}">{inertial * made.inertial}{"".join(shapes) * made.shapes}{made.extra}</link>')
+        if made.parent:
+            ends = f'<parent link="{made.parent}"/><child link="{name}"/>'
+            ends += f'<origin xyz="{triple(made.at)}" rpy="{triple(made.turn)}"/>'
+            limits = '<axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/>' * (made.joint != "fixed")
+            parts.append(f'<joint name="to_{name}" type="{made.joint}">{ends}{limits}</joint>')
+    return f'<robot name="made">{"".join(parts)}</robot>'
+
+
+def arm():
+    """An arm of boxes that are not aligned with the axes, with two fingers and a camera."""
+    finger = Made(0.05, (((0.02, 0.01, 0.06), (0.003, 0.002, 0.03), (0, 0, 0)),), "forearm", (0, 0.03, 0.35), joint="prismatic")
+    return {
+        "base": Made(60.0, (((0.5, 0.4, 0.2), (0, 0, 0.1), (0, 0, 0)), ((0.1, 0.1, 0.3), (0.1, 0, 0.3), (0, 0, 0)))),
+        "upper_arm": Made(4.0, (((0.08, 0.1, 0.4), (0, 0.02, 0.2), (0.3, 0.2, 0)),), "base", (0, 0, 0.45)),
+        "forearm": Made(2.0, (((0.06, 0.05, 0.3), (0, 0, 0.15), (0, 0.4, 0)),), "upper_arm", (0, 0, 0.4)),
+        "left_finger": finger,
+        "right_finger": mirrored(finger),
+        "camera": Made(0.01, (((0.03, 0.03, 0.03), (0, 0, 0), (0, 0, 0)),), "forearm", (0.05, 0, 0.3), joint="fixed"),
+    }
+
+
+def biped():
+    """A biped whose thighs have products of inertia with opposite signs."""
+    thigh = Made(5.0, (((0.1, 0.12, 0.4), (0.02, 0.03, -0.2), (0.25, 0.15, 0.1)),), "pelvis", (0, 0.1, -0.1))
+    shin = Made(3.0, (((0.08, 0.09, 0.4), (0, 0.01, -0.2), (0.1, 0.2, 0)),), "left_thigh", (0.02, 0.02, -0.4))
+    foot = Made(1.0, (((0.22, 0.1, 0.04), (0.05, 0, -0.03), (0, 0.05, 0.2)),), "left_shin", (0, 0, -0.4))
+    return {
+        "pelvis": Made(15.0, (((0.2, 0.3, 0.2), (0, 0, 0), (0, 0, 0)),)),
+        "left_thigh": thigh,
+        "right_thigh": mirrored(thigh),
+        "left_shin": shin,
+        "right_shin": mirrored(shin, parent="right_thigh"),
+        "left_foot": foot,
+        "right_foot": mirrored(foot, parent="right_shin"),
+    }
+
+
+def rover():
+    """A rover; both sides have the same wheel, which is turned on the right side."""
+    wheel = Made(0.8, (((0.2, 0.05, 0.2), (0, 0.01, 0), (0, 0, 0)), ((0.2, 0.05, 0.2), (0, 0.01, 0), (0, np.pi / 4, 0))))
+    wheels = {
+        f"{end}{side}_wheel": replace(
+            wheel, parent="chassis", at=(x, y, 0), turn=(0, 0, 0 if y > 0 else np.pi), joint="continuous"
+        )
+        for end, x in (("f", 0.2), ("r", -0.2)) for side, y in (("l", 0.2), ("r", -0.2))
+    }  # fmt: skip
+    mast = Made(1.5, (((0.05, 0.05, 0.5), (0, 0, 0.25), (0, 0.3, 0)),), "chassis", (0.1, 0, 0.1))
+    return {"chassis": Made(12.0, (((0.6, 0.3, 0.15), (0, 0, 0.05), (0, 0, 0)),)), **wheels, "mast": mast}
+
+
+def drone():
+    """A drone with turned arms and flat rotors."""
+    arm_ = Made(0.2, (((0.25, 0.03, 0.02), (0.1, 0.05, 0), (0, 0.1, 0.5)),), "body", (0.05, 0.05, 0))
+    rotor = Made(0.02, (((0.24, 0.02, 0.002), (0, 0, 0), (0, 0, 0)),), "arm_l", (0.2, 0.1, 0.03), joint="continuous")
+    return {
+        "body": Made(1.2, (((0.2, 0.15, 0.06), (0, 0, 0), (0, 0, 0)),)),
+        "arm_l": arm_,
+        "arm_r": mirrored(arm_),
+        "rotor_l": rotor,
+        "rotor_r": mirrored(rotor, parent="arm_r"),
+        "battery": Made(0.5, (((0.1, 0.04, 0.03), (0, 0, -0.05), (0.1, 0, 0.3)),), "body", (0, 0, 0), joint="revolute"),
+    }
+
+
+ROBOTS = {"arm": arm, "biped": biped, "rover": rover, "drone": drone}
+LINKS = {
+    "arm": ("base", "upper_arm"),
+    "biped": ("pelvis", "left_thigh"),
+    "rover": ("chassis", "mast"),
+    "drone": ("body", "battery"),
+}
+"""A root and a link with products of inertia of each robot."""
+PAIRS = {"arm": "left_finger", "biped": "right_shin", "rover": "fr_wheel", "drone": "arm_r"}
+
+
+def findings(tmp_path, links, text=None, name="made.urdf"):
+    """The findings on the links of a robot by name."""
+    path = tmp_path / name
+    path.write_text(text or urdf(links))
+    return {finding.case: finding for robot in read_robots_here(path) for finding in judge(robot, name)}
+
+
+# --------------------------------------------------------------------------------------------------------- forty made faults
+
+
+def impossible(made):
+    moments, axes = np.linalg.eigh(made.inertia)
+    return {"inertia": axes @ np.diag([moments[0], moments[1], 1.35 * (moments[0] + moments[1])]) @ axes.T}
+
+
+def slipped_moment(made):
+    return {"inertia": made.inertia + np.diag([0, 9 * made.inertia[1, 1], 0])}
+
+
+def negated(made):
+    return {"inertia": 2 * np.diag(np.diag(made.inertia)) - made.inertia}
+
+
+def about_the_origin(made):
+    d = made.com + np.array([0, 0, 1.0])
+    return {"com": d, "inertia": made.inertia}
+
+
+FAULTS = {
+    "impossible": ("impossible inertia", 1, impossible, None),
+    "placeholder": (
+        "placeholder inertia",
+        0,
+        lambda made: {"inertia": 10.0 ** np.floor(np.log10(made.mass) - 5) * np.eye(3)},
+        None,
+    ),
+    "slip of the inertia": ("decimal slip", 1, lambda made: {"inertia": made.inertia / 1000}, "multiply the inertia by 10^3"),
+    "slip up": ("decimal slip", 0, lambda made: {"inertia": 10 * made.inertia}, "multiply the inertia by 10^-1"),
+    "slip of a moment": ("decimal slip", 0, slipped_moment, "multiply iyy by 10^-1"),
+    "twin": ("twins differ", 2, lambda made: {"inertia": 2.5 * made.inertia}, "the mirrored values of"),
+    "grams": ("decimal slip", 0, lambda made: {"mass": 1000 * made.mass}, "multiply the mass by 10^-3"),
+    "millimetres": ("centre of mass outside the shapes", 1, lambda made: {"com": 1000 * made.com}, "by 10^-3"),
+    "sign of products": ("sign of the products of inertia", 1, negated, "change the sign of"),
+    "no inertial": ("no inertial element", 1, lambda made: {"inertial": False}, None),
+}
+"""Keys of the mistakes, the link (0, 1, or 2 for one of a pair), the change, and a part of the repair, if there is one."""
+
+
+def test_there_are_forty_faults():
+    assert len(FAULTS) * len(ROBOTS) == 40
+    assert {key for key, *_ in FAULTS.values()} <= set(BY_KEY)
+
+
+@pytest.mark.parametrize(("fault", "robot"), [(fault, robot) for fault in FAULTS for robot in ROBOTS])
+def test_a_planted_fault_is_found_named_and_repaired(tmp_path, fault, robot):
+    key, which, change, repair = FAULTS[fault]
+    links = ROBOTS[robot]()
+    name = (*LINKS[robot], PAIRS[robot])[which]
+    made = links[name].filled()
+    links[name] = replace(made, **change(made))
+    found = findings(tmp_path, links)
+    assert (found[name].verdict, found[name].mistake) == (Verdict.WRONG, key), found[name]
+    others = {case: (finding.verdict, finding.detail) for case, finding in found.items() if case != name}
+    assert {verdict for verdict, _ in others.values()} == {Verdict.RIGHT}, others
+    assert found[name].effect
+    if repair:
+        assert repair in found[name].repair
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_right_robots_have_no_finding(tmp_path, robot):
+    found = findings(tmp_path, ROBOTS[robot]())
+    assert {finding.verdict for finding in found.values()} == {Verdict.RIGHT}
+    assert not any(finding.detail for finding in found.values())
+
+
+# ------------------------------------------------------------------------------------------- unusual, and nevertheless right
+
+
+def test_what_is_unusual_but_right_has_no_finding(tmp_path):
+    size = np.array([0.3, 0.2, 0.1])
+    a, b, c = size**2
+    shell = 3.0 / 12 * np.diag([b + c, a + c, a + b]) * 1.6  # a hollow box has up to 5/3 of the inertia of a full one
+    rotor = np.diag([0.00012, 0.00012, 0.0002])  # 0.5 kg of copper, 28 mm in radius, in a light box
+    plate = np.diag([0.01, 0.02, 0.03])  # in a plane: the largest moment is the sum of the others
+    links = {
+        "base": Made(3.0, ((size, (0, 0, 0), (0, 0, 0)),), inertia=shell),
+        "motor": Made(0.55, (((0.15, 0.12, 0.1), (0, 0, 0), (0, 0, 0)),), "base", (0.3, 0, 0), inertia=rotor),
+        "plate": Made(1.0, (((0.5, 0.35, 0.00005), (0, 0, 0), (0, 0, 0)),), "base", (0, 0, 0.3), inertia=plate),
+        "imu": Made(0.01, (((0.03, 0.03, 0.02), (0, 0, 0), (0, 0, 0)),), "base", (0, 0, 0.1), inertia=1e-6 * np.eye(3)),
+        "anchor": Made(1e-6, (((0.01,) * 3, (0, 0, 0), (0, 0, 0)),), "base", joint="fixed", inertia=np.diag([0, 0, 3e-6])),
+        "point": Made(0.01, (((0.01,) * 3, (0, 0, 0), (0, 0, 0)),), "base", joint="fixed", inertia=np.zeros((3, 3))),
+        "cross": Made(1.0, (((0.01,) * 3, (0, 0, 0), (0, 0, 0)),), "base", joint="revolute", inertial=False, shapes=False),
+        "tip": Made(1.0, (((0.01,) * 3, (0, 0, 0), (0, 0, 0)),), "cross", joint="fixed", inertial=False),
+    }
+    links["tip"] = replace(links["tip"], parent="plate")
+    found = findings(tmp_path, links)
+    assert {name: finding.verdict for name, finding in found.items()} == dict.fromkeys(links, Verdict.RIGHT), found
+    assert "does not change the motion" in found["anchor"].detail
+    assert "does not change the motion" in found["point"].detail
+
+
+def test_shapes_that_cannot_hold_the_mass_decide_nothing(tmp_path):
+    links = arm()
+    made = links["upper_arm"].filled()
+    symbol = ((0.01, 0.01, 0.01), (0, 0, 0), (0, 0, 0))
+    links["upper_arm"] = replace(made, boxes=(symbol,))
+    found = findings(tmp_path, links)["upper_arm"]
+    assert found.verdict is Verdict.UNDECIDED
+    assert "symbols" in found.detail
+    links["upper_arm"] = replace(made, boxes=((4.0 * np.array(symbol[0]), *symbol[1:]),), mass=0.1, inertia=made.inertia / 40)
+    assert findings(tmp_path, links)["upper_arm"].verdict is Verdict.WRONG
+
+
+def test_an_impossible_inertia_of_a_part_that_hardly_matters_is_wrong_because_engines_refuse_it(tmp_path):
+    links = arm()
+    links["camera"] = replace(links["camera"], mass=0.05, inertia=1e-6 * np.diag([1.0, 1.0, 3.5]))
+    found = findings(tmp_path, links)["camera"]
+    assert (found.verdict, found.mistake) == (Verdict.WRONG, "impossible inertia")
+    assert "refuse" in found.effect
+
+
+def test_twins_may_have_axes_of_their_own(tmp_path):
+    """The right wheel of the rover is the left one, turned by 180 degrees; products and centres follow the axes of each."""
+    links = rover()
+    spoke = ((0.05, 0.05, 0.3), (0.05, 0.02, 0.1), (0.2, 0.3, 0.1))
+    turned = {name: replace(link, boxes=(*link.boxes, spoke)) for name, link in links.items() if "wheel" in name}
+    found = findings(tmp_path, {**links, **turned})
+    assert {finding.verdict for finding in found.values()} == {Verdict.RIGHT}
+
+
+def test_twins_that_their_shapes_do_not_tell_apart_are_both_named(tmp_path):
+    links = biped()
+    made = links["right_shin"].filled()
+    links["right_shin"] = replace(made, mass=1.6 * made.mass, inertia=1.6 * made.inertia)
+    found = findings(tmp_path, links)
+    for name in ("left_shin", "right_shin"):
+        assert (found[name].verdict, found[name].mistake) == (Verdict.WRONG, "twins differ")
+        assert not found[name].repair
+
+
+@pytest.mark.parametrize(
+    ("name", "other"),
+    [
+        ("left_arm", "right_arm"),
+        ("LShoulderYaw", "RShoulderYaw"),
+        ("arm_left_1_link", "arm_right_1_link"),
+        ("FL_calf", "FR_calf"),
+        ("lf_foot", "rf_foot"),
+        ("LeftHand", "RightHand"),
+        ("LEFT_SHIN", "RIGHT_SHIN"),
+        ("link_l", "link_r"),
+        ("/World/left_leg", "/World/right_leg"),
+        ("elbow", ""),
+        ("caliper", ""),
+    ],
+)  # fmt: skip
+def test_names_of_the_other_side(name, other):
+    assert other_side(name) == other
+
+
+# ----------------------------------------------------------------------------------------------------------------- the effect
+
+
+def test_the_effect_is_the_ratio_of_the_accelerations(tmp_path):
+    links = arm()
+    made = links["base"].filled()
+    links["base"] = replace(made, inertia=0.001 * np.eye(3))
+    found = findings(tmp_path, links)["base"]
+    (times,) = re.findall(r"([\d,]+) times too fast", found.effect)
+    # The effect is relative to the hull of the shapes, which is a little more than the two boxes.
+    wanted = np.linalg.eigvalsh(made.inertia)[-1] / 0.001
+    assert float(times.replace(",", "")) == pytest.approx(wanted, rel=0.4)  # measured: 2,200 and 2,060
+
+
+def test_bounds_hold_for_any_mass_distribution():
+    """Points with random masses in a box: the radius of gyration is within reach, and no body is denser than a ball."""
+    rng = np.random.default_rng(55)
+    for _ in range(50):
+        corners = rng.normal(size=(12, 3)) * rng.uniform(0.1, 1, 3)
+        hull = hull_of([corners])
+        weights = rng.dirichlet(np.full(12, 0.3))
+        com = weights @ corners
+        d = corners - com
+        J = np.einsum("n,ni,ni->", weights, d, d) * np.eye(3) - np.einsum("n,ni,nj->ij", weights, d, d)
+        assert reach(Piece(1.0, com, J), hull) <= 1 + 1e-9  # measured: up to 1
+        assert hull.outside(com) <= 1e-12
+        part = Piece(2.0, np.zeros(3), 2 * hull.solid.inertia)
+        assert density_of(part, ()) <= density_of(part, [hull]) * (1 + 1e-9)
+        assert density_of(part, [hull]) == pytest.approx(2 / hull.volume, rel=1e-9)
+    radius = (3 * 60 / (4 * np.pi * 7850)) ** (1 / 3)
+    assert density_of(Piece(60.0, np.zeros(3), 0.4 * 60 * radius**2 * np.eye(3)), ()) == pytest.approx(7850, rel=1e-12)
+
+
+# ---------------------------------------------------------------------------------------------------------------- the formats
+
+
+def mjcf(inertia="0.01 0.02 0.025"):
+    return f"""<mujoco><compiler balanceinertia="true"/><worldbody><body name="base"><freejoint/>
+    <inertial pos="0.1 0 0" mass="2" diaginertia="{inertia}"/><geom type="box" size="0.2 0.15 0.1" pos="0.1 0 0"/>
+    <body name="tip" pos="0.3 0 0"><joint axis="0 0 1"/><geom type="sphere" size="0.05"/></body></body></worldbody></mujoco>"""
+
+
+USD = """#usda 1.0
+(metersPerUnit = 0.01
+ upAxis = "Z")
+def Xform "World" {{
+    def Cube "base" (prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsMassAPI", "PhysicsCollisionAPI"])
+    {{
+        double size = 20
+        float physics:mass = 3
+        float3 physics:diagonalInertia = ({moments})
+        point3f physics:centerOfMass = ({com})
+    }}
+}}
+"""
+SDF = """<sdf version="1.9"><model name="m"><link name="base"><pose>1 2 3 0 0 0</pose><inertial>
+<pose>{com} 0 0 0</pose><mass>3</mass><inertia><ixx>0.02</ixx><iyy>{iyy}</iyy><izz>0.02</izz></inertia></inertial>
+<visual name="v"><geometry><box><size>0.2 0.2 0.2</size></box></geometry></visual></link></model></sdf>"""
+
+
+def test_mjcf_is_judged_by_its_own_numbers(tmp_path):
+    pytest.importorskip("mujoco")
+    right = findings(tmp_path, {}, mjcf(), "m.xml")
+    assert {name: finding.verdict for name, finding in right.items()} == {"base": Verdict.RIGHT, "tip": Verdict.RIGHT}
+    assert right["base"].mass == 2
+    wrong = findings(tmp_path, {}, mjcf("0.01 0.02 0.05"), "m.xml")["base"]  # MuJoCo would balance it
+    assert (wrong.verdict, wrong.mistake) == (Verdict.WRONG, "impossible inertia")
+    assert wrong.moments == pytest.approx((0.01, 0.02, 0.05))
+
+
+def test_usd_in_centimetres(tmp_path):
+    pytest.importorskip("pxr")
+    right = findings(tmp_path, {}, USD.format(moments="200, 200, 200", com="0, 0, 0"), "m.usda")["/World/base"]
+    assert (right.verdict, right.moments) == (Verdict.RIGHT, pytest.approx((0.02, 0.02, 0.02)))
+    wrong = findings(tmp_path, {}, USD.format(moments="0.02, 0.02, 0.02", com="0, 0, 0"), "m.usda")["/World/base"]  # in kg m^2
+    assert wrong.mistake in ("decimal slip", "placeholder inertia")
+    wrong = findings(tmp_path, {}, USD.format(moments="200, 200, 200", com="0, 30, 0"), "m.usda")["/World/base"]
+    assert wrong.mistake == "centre of mass outside the shapes"
+
+
+def test_sdf(tmp_path):
+    assert findings(tmp_path, {}, SDF.format(com="0 0 0", iyy=0.02), "m.sdf")["base"].verdict is Verdict.RIGHT
+    assert findings(tmp_path, {}, SDF.format(com="0 0 0", iyy=0.2), "m.sdf")["base"].repair == "multiply iyy by 10^-1"
+    assert findings(tmp_path, {}, SDF.format(com="0 0.5 0", iyy=0.02), "m.sdf")["base"].mistake.startswith("centre")
+
+
+COLLADA = """<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset><unit meter="0.01"/></asset>
+<library_geometries><geometry id="g"><mesh><source id="p">
+<float_array id="a" count="12">0 0 0 10 0 0 0 10 0 0 0 10</float_array>
+</source><vertices id="v"><input semantic="POSITION" source="#p"/></vertices></mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene><node><translate>1 0 0</translate><rotate>0 0 1 90</rotate><instance_geometry url="#g"/>
+</node></visual_scene></library_visual_scenes></COLLADA>"""
+
+
+def test_points_of_collada_are_in_metres_and_in_the_axes_of_the_scene():
+    points = read_collada(COLLADA.encode())
+    assert points == pytest.approx(np.array([[0.01, 0, 0], [0.01, 0.1, 0], [-0.09, 0, 0], [0.01, 0, 0.1]]), abs=1e-12)
+    for text in ("no XML", COLLADA.replace("<float_array", "<int_array").replace("/float_array", "/int_array")):
+        with pytest.raises(Unread):
+            read_collada(text.encode())
+
+
+def test_a_mesh_that_is_not_there_is_no_fault(tmp_path):
+    links = arm()
+    mesh = '<visual><geometry><mesh filename="package://p/gone.stl"/></geometry></visual>'
+    links["upper_arm"] = replace(links["upper_arm"].filled(), com=np.array([0, 0, 5.0]), extra=mesh)
+    found = findings(tmp_path, links)
+    assert found["upper_arm"].verdict is Verdict.RIGHT  # its shapes are not known
+    assert found["base"].verdict is Verdict.RIGHT
+
+
+# ---------------------------------------------------------------------------------------------------------------- the command
+
+
+@pytest.fixture
+def read_in_this_process(monkeypatch):
+    """Files are read here: each reading has a process of its own otherwise."""
+
+    class Here:
+        close = staticmethod(lambda: None)
+
+    monkeypatch.setattr(robot_links, "python_worker", lambda *_: Here())
+    monkeypatch.setattr(robot_links, "run_within", lambda seconds, work, process: work())
+
+
+@pytest.fixture
+def library(tmp_path):
+    """A folder of two packages with a robot each, of which one has a fault, and XML that is no model."""
+    wrong = biped()
+    wrong["pelvis"] = replace(wrong["pelvis"].filled(), inertia=0.0001 * np.eye(3))
+    for name, links in (("good", arm()), ("bad", wrong)):
+        folder = tmp_path / "library" / f"{name}_description" / "urdf"
+        folder.mkdir(parents=True)
+        (folder / f"{name}.urdf").write_text(urdf(links))
+        (folder.parent / "package.xml").write_text("<package/>")
+        (folder / "template.xml").write_text('<robot xmlns:xacro="x"><xacro:macro/><link name="a"/></robot>')
+    return tmp_path / "library"
+
+
+def test_a_library_is_verified_without_an_engine(library, monkeypatch, read_in_this_process):
+    monkeypatch.setattr(models, "installed_loaders", set)
+    bad, good = verify(str(library))
+    assert (bad.verdict, good.verdict) == (Verdict.WRONG, Verdict.RIGHT)
+    assert [finding.case for finding in bad.findings] == list(biped())
+    assert {finding.check for finding in (*bad.findings, *good.findings)} == {"links"}
+    assert "placeholder inertia: 1" in bad.reason
+
+
+def test_the_command_writes_one_page_with_a_line_per_link(library, tmp_path, read_in_this_process):
+    pytest.importorskip("jinja2")
+    out = tmp_path / "page"
+    result = CliRunner().invoke(main, ["verify", str(library), "--only", "links", "--out", str(out)])
+    assert result.exit_code == 1, result.output
+    page = re.sub(r"<wbr>|\n", "", (out / "verify.html").read_text())
+    names = [*arm(), *biped()]
+    assert all(
+        f">{name}<" in page.replace("<wbr>", "").replace("\n", "") or name in page.replace("<wbr>", "") for name in names
+    )
+    data = json.loads((out / "verify.json").read_text())
+    lines = [finding for subject in data["subjects"] for finding in subject["findings"]]
+    assert sorted(line["case"] for line in lines) == sorted(names)
+    (pelvis,) = (line for line in lines if line["verdict"] == "wrong")
+    assert (pelvis["case"], pelvis["causes"][0]["keys"]) == ("pelvis", ["placeholder inertia"])
+    assert "too fast" in pelvis["effect"]
+    right = CliRunner().invoke(main, ["verify", str(library / "good_description" / "urdf" / "good.urdf"), "--only", "links"])
+    assert right.exit_code == 0, right.output
+
+
+def test_one_bad_file_of_a_library_is_not_tested_and_alone_it_is_bad_input(library, read_in_this_process):
+    broken = library / "bad_description" / "urdf" / "bad.urdf"
+    broken.write_text('<robot name="r"><link name="a"><inertial><mass value="nan"/></inertial></link></robot>')
+    bad, good = verify(str(library), only="links")
+    assert (bad.verdict, good.verdict) == (Verdict.NOT_TESTED, Verdict.RIGHT)
+    with pytest.raises(BadInput, match="nan"):
+        verify(str(broken), only="links")
+
+
+def test_engines_are_refused_without_the_check_that_uses_them(library):
+    with pytest.raises(BadInput, match="bodies"):
+        verify(str(library), only="links", engines="mujoco")
+
+
+@pytest.mark.parametrize("key", sampled([mistake.key for mistake in FILES]))
+def test_the_effect_of_each_mistake_of_the_catalogue_is_found(tmp_path, key):
+    """The catalogue's own effect, on a link with the products of a turned box, or on one of twins."""
+    (mistake,) = (each for each in FILES if each.key == key)
+    name = "right_thigh" if key == "twins differ" else "left_thigh"
+    path = tmp_path / "m.urdf"
+    path.write_text(urdf(biped()))
+    (robot,) = read_robots_here(path)
+    robot.links = [
+        replace(link, link=mistake.change(link.link)) if link.name == name else link for link in robot.links
+    ]  # fmt: skip
+    found = {finding.case: finding for finding in judge(robot, "m.urdf")}[name]
+    assert found.verdict is Verdict.WRONG
+    assert key in {each for cause in found.causes for each in cause.keys} or (key, found.mistake) in {
+        ("inertia outside the shapes", "decimal slip"), ("inertia too small", "decimal slip")
+    }  # fmt: skip
