@@ -22,7 +22,7 @@ from conservative.references.worker.client import EngineCrashed, EngineError
 
 from ..compare import largest_difference
 from ..finding import Finding, Verdict
-from .pairs import OF_INERTIA, PAIRS, Description, Pair, Samples, frame_back, to_principal
+from .pairs import OF_INERTIA, PAIRS, TURNED, Description, Pair, Samples, frame_back, to_principal
 from .runner import NotAvailable, Runner, run, runner_of
 from .script import script_name, script_of
 
@@ -193,7 +193,7 @@ class Engine:
                 # An engine moves such an inertia to the centre or to principal axes, with rounding of its largest part.
                 J = J + eps * (body.mass * (body.com @ body.com) + np.abs(J).max()) * (rough + rough.T) / 2
             moved = replace(body, R0=rotation_about(axis, eps) @ body.R0, w0=body.w0 * (1 + eps * factor[0]), inertia=J)
-            moved, R_FG = (moved, np.eye(3)) if body.variant == "frame" else to_principal(moved)
+            moved, R_FG = (moved, np.eye(3)) if body.variant in TURNED else to_principal(moved)
             with suppress(NotAvailable, IntegrationFailed):
                 largest = max(largest, difference(samples, frame_back(R_FG)(self.runner.model(moved)())))
         steps = math.sqrt(body.n_steps) if self.runner.adaptive else body.n_steps
