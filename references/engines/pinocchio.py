@@ -127,7 +127,9 @@ def _stepper(pin, given):
     else:
         model = pin.Model()
         joint = model.addJoint(0, kind, pin.SE3.Identity(), "body")
-        parts = [DUMMY] if description_of(given) == "setter" else [(mass, given.com, inertia) for mass, inertia in halves(given)]
+        parts = (
+            [DUMMY] if description_of(given) == "setter" else [(mass, given.com, inertia) for mass, inertia in halves(given)]
+        )
         for part in parts:  # about the centre of mass, in the axes of the joint
             model.appendBodyToJoint(joint, pin.Inertia(*part), pin.SE3.Identity())
     model = _change(pin, model, given)

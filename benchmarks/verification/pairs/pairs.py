@@ -222,6 +222,8 @@ WRAPPED = MappingProxyType({"rewritten": "file loaded and saved", "mass": "mass 
 """Names of pairs, by their variants, in which an engine changes a file that it has loaded. Their axes are not principal."""
 TURNED = ("frame", *WRAPPED)
 """Variants whose axes F are not principal."""
+LOADED = ("file", "setter", "saved", *WRAPPED)
+"""Variants in which a mistake of a loader, a writer or a setter gives the engine another body."""
 OF_INERTIA = ("frame", "offset", "file", "setter", "child", "joints", "saved", *WRAPPED)
 """Variants that are about the inertia."""
 FREE = ("body", "needle", "thin rod")
