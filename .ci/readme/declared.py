@@ -137,11 +137,23 @@ def motions() -> str:
     return table(["needs", "motions"], [[features, ", ".join(motions)] for features, motions in names.items()])
 
 
+def pairs() -> str:
+    """Return a row for each pair that needs a description of its own, with the engines whose adapters declare it."""
+    from conservative.benchmarks.verification.pairs.pairs import PAIRS
+
+    kinds = {name: kind for group in GROUPS for name, kind in entries(group)}
+    declared = {name: kind.data.descriptions for name, kind in kinds.items() if hasattr(kind, "data")}
+    rows = ([pair, sorted(name for name, those in declared.items() if pair.variant in those)] for pair in PAIRS)
+    lines = [[pair.name, f"`{pair.variant}`", ", ".join(map("`{}`".format, names))] for pair, names in rows if names]
+    return table(["pair", "description", "engines"], lines)
+
+
 TABLES: dict[str, Callable[[], str]] = {
     "methods": methods,
     "support": support,
     "engines": partial(engines, GROUPS[0], ROOT / "references" / "README.md"),
     "engines in environments": partial(engines, GROUPS[1], ROOT / "references" / "README.md"),
     "motions": motions,
+    "pairs of engines": pairs,
 }
 """Tables by the name of their mark."""

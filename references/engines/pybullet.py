@@ -17,6 +17,7 @@ PyBullet Quickstart Guide, changeDynamics, createMultiBody, setJointMotorControl
 https://github.com/bulletphysics/bullet3/blob/master/docs/pybullet_quickstartguide.pdf
 """
 
+from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
@@ -125,10 +126,10 @@ def _build_from_file(bullet, given):
     if description == "rewritten" and not given.free:
         raise NotImplementedError("UrdfEditor does not write spherical joints")
     with TemporaryDirectory() as folder:
-        with open(f"{folder}/body.urdf", "w") as file:
-            file.write(write_file(given))
+        file = Path(folder) / "body.urdf"
+        file.write_text(write_file(given))
         options = {"flags": bullet.URDF_USE_INERTIA_FROM_FILE, "useFixedBase": not given.free}
-        body = bullet.loadURDF(file.name, globalScaling=OTHER_SIZE if description == "scaled" else 1.0, **options)
+        body = bullet.loadURDF(str(file), globalScaling=OTHER_SIZE if description == "scaled" else 1.0, **options)
         if description == "rewritten":
             from pybullet_utils.urdfEditor import UrdfEditor
 

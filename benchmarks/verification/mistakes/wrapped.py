@@ -1,4 +1,4 @@
-"""Mistakes of programs that save a file which they have loaded, set a mass, or scale a body: each changes the body of the file."""
+"""Mistakes of programs that save a file which they have loaded, set a mass, or scale: each changes the body of the file."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ def find_causes(second: Description, error: float, allowed: float, apart: Callab
     error, allowed
         The difference of both motions, and the allowed one.
     apart
-        Function that returns how far the motion of a body in the axes of `second`, described as usual, is from the second motion.
+        Function that returns how far the motion of a body in the axes of `second`, described as usual, is from the second one.
 
     Several mistakes are returned if they leave about as little.
     """
