@@ -558,7 +558,7 @@ FOUND = {
     "pybullet": ("scaled", {"top: scaled"}, ""),
     "pybullet:multibody": (
         "mass set after loading",
-        {f"{body}: mass set after loading" for body in ("body", "top", "thin rod")},  # the needle is lost with its usual inertia
+        {f"{body}: mass set after loading" for body in ("body", "top", "thin rod")},  # the first motion of the needle is lost
         "",
     ),
     "drake": ("mass set after loading", set(), ""),
