@@ -11,6 +11,7 @@ FIGURES, SOURCES = (ROOT / "tests" / "data" / f"published_{name}.csv" for name i
 BODIES = ROOT / "references" / "model_files" / "measured.csv"
 MISTAKES = ROOT / "reports" / "documentation" / "mistakes.csv"
 BRICK = ROOT / "references" / "engines" / "brick.csv"
+WRAPPED = ROOT / "benchmarks" / "verification" / "pairs" / "wrapped.csv"
 LOST = 1.0
 """Attitude errors, rad, above which the attitude is lost."""
 LATE = 10
@@ -62,10 +63,30 @@ def brick() -> str:
     )
 
 
+def wrapped() -> str:
+    """Return a row for each engine and pair of a file that it saves, sets or scales."""
+    rows = [(*row["case"].split(": "), row) for row in read_csv(WRAPPED)]
+    groups = dict.fromkeys((row["subject"], pair) for _, pair, row in rows if row["error"] not in ("", "nan"))
+    lines = list[list[str]]()
+    for subject, pair in groups:
+        some = [row for _, name, row in rows if (row["subject"], name) == (subject, pair)]
+        verdicts = Counter(row["verdict"] for row in some)
+        worst = max((row for row in some if row["error"] != "nan"), key=lambda row: float(row["error"]) / float(row["allowed"]))
+        named = dict.fromkeys(row["mistakes"] for row in some if row["mistakes"])
+        mistakes = [mistake for mistake in named if ";" not in mistake] or [*named]
+        body = worst["case"].partition(":")[0]
+        counts = ", ".join(f"{count} {verdict}" for verdict, count in verdicts.items())
+        lines.append(
+            [subject, pair, counts, body, *(f"{float(worst[n]):.2g}" for n in ("error", "allowed")), "; ".join(mistakes)]
+        )
+    return table(["engine", "pair", "bodies", "worst body", "error, rad", "allowed, rad", "mistakes"], lines)
+
+
 TABLES: dict[str, Callable[[], str]] = {
     "published figures": figures,
     "loaded bodies": bodies,
     "named mistakes": mistakes,
     "engines on the brick": brick,
+    "wrapped files": wrapped,
 }
 """Tables by the name of their mark."""

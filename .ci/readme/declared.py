@@ -158,6 +158,19 @@ def _small_set() -> list[one_file.Description]:
 
 MOTION_TESTS = {name: language for language, name in one_file.LANGUAGES.items()}
 """Languages by the names of the tests."""
+
+
+def pairs() -> str:
+    """Return a row for each pair that needs a description of its own, with the engines whose adapters declare it."""
+    from conservative.benchmarks.verification.pairs.pairs import PAIRS
+
+    kinds = {name: kind for group in GROUPS for name, kind in entries(group)}
+    declared = {name: kind.data.descriptions for name, kind in kinds.items() if hasattr(kind, "data")}
+    rows = ([pair, sorted(name for name, those in declared.items() if pair.variant in those)] for pair in PAIRS)
+    lines = [[pair.name, f"`{pair.variant}`", ", ".join(map("`{}`".format, names))] for pair, names in rows if names]
+    return table(["pair", "description", "engines"], lines)
+
+
 TABLES: dict[str, Callable[[], str]] = {
     "methods": methods,
     "support": support,
@@ -165,5 +178,6 @@ TABLES: dict[str, Callable[[], str]] = {
     "engines in environments": partial(engines, GROUPS[1], ROOT / "references" / "README.md"),
     "motions": motions,
     "changes": changes,
+    "pairs of engines": pairs,
 }
 """Tables by the name of their mark."""

@@ -30,7 +30,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from .shared import FAR_MASS, FIELDS, LATER, description_of, field_torque, halves, pack_field, write_urdf
+from .shared import FAR_MASS, FIELDS, LATER, OTHER_MASS, description_of, field_torque, halves, pack_field, rescaled, write_urdf
 
 ENGINE = {
     "package": "drake",
@@ -44,7 +44,7 @@ ENGINE = {
     },
     "tolerance": "accuracy",
     "fields": FIELDS,
-    "descriptions": ("frame", "offset", "file", "child", "world", "time"),
+    "descriptions": ("frame", "offset", "file", "setter", "child", "world", "time", "mass"),
     "method_info": {
         "variants": (
             *("discrete", "cenic", "runge_kutta3", "runge_kutta5"),
@@ -66,6 +66,7 @@ def prepare(given):
     plant, body, simulator = _build(drake, given)
     context = simulator.get_mutable_context()
     inner = plant.GetMyMutableContextFromRoot(context)
+    _set_body(drake, body, inner, given)
     start = _start(drake, plant, body, inner, given)
     begin = LATER if description_of(given) == "time" else 0.0
     times = begin + given.steps * given.dt
@@ -127,8 +128,10 @@ def _build(drake, given):
         plant = builder.AddSystem(drake.MultibodyPlant(given.dt if discrete else 0.0))
     if description_of(given) == "world":
         plant.AddRigidBody("far", drake.SpatialInertia.SolidSphereWithMass(FAR_MASS, 2.0))
-    if description_of(given) == "file":
-        drake.Parser(plant).AddModelsFromString(write_urdf(given), "urdf")
+    if description_of(given) in ("file", "setter", "mass"):
+        factor = 1.0 if description_of(given) == "file" else OTHER_MASS
+        text = write_urdf(rescaled(given, mass=factor, inertia=factor))
+        drake.Parser(plant).AddModelsFromString(text, "urdf")
         body = plant.GetBodyByName("body")
     else:
         body, *child = (_add_body(drake, plant, given, *part, name) for part, name in zip(halves(given), ("body", "child")))  # noqa: B905
@@ -152,10 +155,21 @@ def _build(drake, given):
     return plant, body, simulator
 
 
-def _add_body(drake, plant, given, mass, inertia, name):
+def _set_body(drake, body, context, given):
+    """Set the inertia in a context, or the mass, with which `SetMass` scales the inertia."""
+    if description_of(given) == "setter":
+        body.SetSpatialInertiaInBodyFrame(context, _inertia(drake, given, given.mass, given.inertia_com))
+    if description_of(given) == "mass":
+        body.SetMass(context, given.mass)
+
+
+def _inertia(drake, given, mass, inertia):
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = inertia.tolist()
-    rotational = drake.RotationalInertia(xx, yy, zz, xy, xz, yz)
-    return plant.AddRigidBody(name, drake.SpatialInertia.MakeFromCentralInertia(mass, given.com, rotational))
+    return drake.SpatialInertia.MakeFromCentralInertia(mass, given.com, drake.RotationalInertia(xx, yy, zz, xy, xz, yz))
+
+
+def _add_body(drake, plant, given, mass, inertia, name):
+    return plant.AddRigidBody(name, _inertia(drake, given, mass, inertia))
 
 
 def _field_system(drake, field):

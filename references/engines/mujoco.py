@@ -41,7 +41,21 @@ ENGINE = {
     "settings": {"integrator": "RK4", "threads": 1},
     "orders": {name: 4 if name == "RK4" else 1 for name in INTEGRATORS},
     "fields": FIELDS,
-    "descriptions": ("frame", "offset", "file", "setter", "child", "joints", "world", "time", "damping", "saved"),
+    "descriptions": (
+        "frame",
+        "offset",
+        "file",
+        "setter",
+        "child",
+        "joints",
+        "world",
+        "time",
+        "damping",
+        "saved",
+        "rewritten",
+        "mass",
+        "scaled",
+    ),
     "method_info": {
         "variants": INTEGRATORS,
         "report": ("Euler", ""),
@@ -169,7 +183,7 @@ def _model(mj, given):
     if integrator is None:
         has = [kind[6:] for kind in dir(mj.mjtIntegrator) if kind.startswith("mjINT_")]
         raise NotImplementedError(f"MuJoCo {mj.__version__} has no integrator {given.integrator}, but {', '.join(has)}")
-    spec = mj.MjSpec.from_string(write_mjcf(given)) if description_of(given) in WRITTEN else mj.MjSpec()
+    spec = _read_file(mj, given) if description_of(given) in WRITTEN else mj.MjSpec()
     spec.option.timestep = given.dt
     spec.option.integrator = integrator
     spec.option.gravity = (0, 0, -given.gravity)
@@ -194,6 +208,8 @@ def _model(mj, given):
         for name, value in zip(("mass", "ipos", "inertia", "iquat"), _inertial(given), strict=True):
             getattr(model, f"body_{name}")[1] = value
         mj.mj_setConst(model, mj.MjData(model))
+    if description_of(given) == "mass":
+        mj.mj_setTotalmass(model, given.mass)  # "Scale body masses and inertias to achieve specified total mass."
     if description_of(given) == "saved":
         with TemporaryDirectory() as folder:
             mj.mj_saveModel(model, f"{folder}/body.mjb", None)
@@ -201,7 +217,17 @@ def _model(mj, given):
     return model
 
 
-WRITTEN = ("file", "child", "joints", "world", "damping")
+def _read_file(mj, given):
+    """Return the body's file as a specification; for "rewritten", the file that MuJoCo writes after it has loaded it."""
+    text = write_mjcf(given)
+    if description_of(given) != "rewritten":
+        return mj.MjSpec.from_string(text)
+    with TemporaryDirectory() as folder:
+        mj.mj_saveLastXML(f"{folder}/saved.xml", mj.MjModel.from_xml_string(text))
+        return mj.MjSpec.from_file(f"{folder}/saved.xml")
+
+
+WRITTEN = ("file", "child", "joints", "world", "damping", "rewritten", "mass", "scaled")
 """Descriptions of a body by a file."""
 DUMMY = 1, (0.1, 0.2, 0.3), (2, 3, 4), (0.6, 0.8, 0, 0)
 """A body whose centre and axes differ from its frame: MuJoCo decides when it compiles a model whether they

@@ -16,9 +16,11 @@ References
 aba, integrate: https://docs.ros.org/en/kinetic/api/pinocchio/html/
 """
 
+from tempfile import TemporaryDirectory
+
 import numpy as np
 
-from .shared import FIELDS, compile_torque, description_of, halves, pack_field, write_urdf
+from .shared import FIELDS, OTHER_MASS, compile_torque, description_of, halves, pack_field, rescaled, write_urdf
 
 ENGINE = {
     "package": "pin",
@@ -27,7 +29,7 @@ ENGINE = {
     "orders": {"Euler": 1, "RK4": 4},
     "prefix": "aba+",
     "fields": FIELDS,
-    "descriptions": ("frame", "offset", "file", "child", "joints"),
+    "descriptions": ("frame", "offset", "file", "setter", "child", "joints", "saved", "rewritten", "mass"),
     "method_info": {
         "variants": ("Euler", "RK4"),
         "report": ("",),
@@ -38,6 +40,9 @@ ENGINE = {
         "flight": True,
     },
 }
+
+DUMMY = 1.0, np.array([0.1, 0.2, 0.3]), np.array([[2.0, 0.1, 0.2], [0.1, 3.0, 0.3], [0.2, 0.3, 4.0]])
+"""Mass, kg, centre of mass, m, and inertia, kg m^2, of a body before its setter."""
 
 
 def prepare(given):
@@ -116,13 +121,18 @@ def _stepper(pin, given):
     that acts from the right, q' = q v, with v in body axes.
     """
     kind = pin.JointModelFreeFlyer() if _flies(given) else pin.JointModelSpherical()
-    if description_of(given) == "file":
-        model = pin.buildModelFromXML(write_urdf(given), kind)
+    if description_of(given) in ("file", "rewritten", "mass"):
+        file = rescaled(given, mass=OTHER_MASS) if description_of(given) == "mass" else given
+        model = pin.buildModelFromXML(write_urdf(file), kind)
     else:
         model = pin.Model()
         joint = model.addJoint(0, kind, pin.SE3.Identity(), "body")
-        for mass, inertia in halves(given):  # about the centre of mass, in the axes of the joint
-            model.appendBodyToJoint(joint, pin.Inertia(mass, given.com, inertia), pin.SE3.Identity())
+        parts = (
+            [DUMMY] if description_of(given) == "setter" else [(mass, given.com, inertia) for mass, inertia in halves(given)]
+        )
+        for part in parts:  # about the centre of mass, in the axes of the joint
+            model.appendBodyToJoint(joint, pin.Inertia(*part), pin.SE3.Identity())
+    model = _change(pin, model, given)
     model.gravity.linear = np.array([0.0, 0.0, -given.gravity])
     aba, integrate, data, tau, dt = pin.aba, pin.integrate, model.createData(), np.zeros(model.nv), given.dt
     field, torque, bracket = pack_field(given), compile_torque(), _cross_motions if model.nv == 6 else _cross
@@ -149,6 +159,23 @@ def _stepper(pin, given):
         return integrate(model, q, u), v + (a1 + 2 * (a2 + a3) + a4) / 6
 
     return rk4 if given.scheme == "RK4" else euler
+
+
+def _change(pin, model, given):
+    """Return the model after what its description asks for: its body is set, or it is saved and loaded."""
+    description = description_of(given)
+    if description == "setter":
+        model.inertias[1] = pin.Inertia(given.mass, given.com, given.inertia_com)
+    if description == "mass":
+        model.inertias[1].mass = given.mass  # an inertia about the centre of mass, which stays
+    if description in ("saved", "rewritten"):
+        kind, loaded = "Binary" if description == "saved" else "XML", pin.Model()
+        with TemporaryDirectory() as folder:
+            arguments = (f"{folder}/body", *(("model",) if kind == "XML" else ()))
+            getattr(model, f"saveTo{kind}")(*arguments)
+            getattr(loaded, f"loadFrom{kind}")(*arguments)
+        return loaded
+    return model
 
 
 def _cross_motions(a, b):

@@ -17,11 +17,12 @@ PyBullet Quickstart Guide, changeDynamics, createMultiBody, setJointMotorControl
 https://github.com/bulletphysics/bullet3/blob/master/docs/pybullet_quickstartguide.pdf
 """
 
-from tempfile import NamedTemporaryFile
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from .shared import FAR_MASS, FAR_PLACE, description_of, sample, write_urdf
+from .shared import FAR_MASS, FAR_PLACE, OTHER_MASS, OTHER_SIZE, description_of, rescaled, sample, write_urdf
 
 ENGINE = {
     "package": "pybullet",
@@ -32,7 +33,7 @@ ENGINE = {
     "fields": ("UniformGravity",),
     "free_only": {"maximal": "PyBullet has no joint to the world for a body in maximal coordinates"},
     "rate_limit": 100.0,  # maxJointVelocity
-    "descriptions": ("offset", "file", "world"),
+    "descriptions": ("offset", "file", "world", "setter", "rewritten", "mass", "scaled"),
     "method_info": {
         "variants": ("", "maximal", "as_installed=true"),
         "as_installed": ("as_installed=true",),
@@ -50,7 +51,11 @@ def prepare(given):
     if not bullet.isConnected():
         bullet.connect(bullet.DIRECT)
     flies = hasattr(given, "p_WB0")
-    build, ready = _build_free if given.free else _build_held, []
+    of_file = description_of(given) in OF_FILES
+    build, from_file = _build_free if given.free else _build_held, of_file and given.free
+    if of_file:
+        build = _build_from_file
+    ready, axes = [], [given.q_com]
 
     def renew():
         bullet.resetSimulation()
@@ -59,6 +64,8 @@ def prepare(given):
         if description_of(given) == "world":
             bullet.createMultiBody(FAR_MASS, -1, -1, list(FAR_PLACE))
         ready[:] = [build(bullet, given)]
+        if from_file:
+            axes[:] = [_inertial_axes(bullet, ready[0])]
 
     def run():
         if not ready:
@@ -77,11 +84,11 @@ def prepare(given):
         if flies:  # Bullet's frame is at the centre of mass
             arm = np.array([_matrix(q) for q in samples["q"]]) @ given.com
             samples |= {"p": samples["p"] - arm, "v": samples["v"] - np.cross(samples["w_W"], arm)}
-        if given.free:
+        if given.free and not from_file:
             return samples
         # From the principal axes about the centre of mass to the axes F.
-        back = given.q_com * (1, -1, -1, -1)
-        return {"q": _product(samples["q"], back), "w": samples["w_W"] @ _matrix(given.q_com).T}
+        q = _product(samples["q"], axes[0] * (1, -1, -1, -1))
+        return {"q": q, "w_W": samples["w_W"]} if given.free else {"q": q, "w": samples["w_W"] @ _matrix(given.q_com).T}
 
     run.renew = renew
     return run
@@ -93,22 +100,76 @@ def _build_free(bullet, given):
     shape = bullet.createCollisionShape(bullet.GEOM_SPHERE, radius=0.1) if maximal else -1
     arm = given.R0 @ given.com if hasattr(given, "p_WB0") else np.zeros(3)
     place = (getattr(given, "p_WB0", 0) + arm).tolist()
-    if description_of(given) == "file" and maximal:
-        raise NotImplementedError("the file has no shape, which a body in maximal coordinates needs")
-    if description_of(given) == "file":
-        with NamedTemporaryFile("w", suffix=".urdf") as file:
-            file.write(write_urdf(given))
-            file.flush()
-            body = bullet.loadURDF(file.name, place, _x_first(given.q0), flags=bullet.URDF_USE_INERTIA_FROM_FILE)
-    else:
-        body = bullet.createMultiBody(given.mass, shape, -1, place, _x_first(given.q0), useMaximalCoordinates=maximal)
+    body = bullet.createMultiBody(given.mass, shape, -1, place, _x_first(given.q0), useMaximalCoordinates=maximal)
     # Without its mass, a body in maximal coordinates would have a position that is not finite.
-    if description_of(given) != "file":
-        bullet.changeDynamics(body, -1, mass=given.mass, localInertiaDiagonal=given.moments_com.tolist())
+    bullet.changeDynamics(body, -1, mass=given.mass, localInertiaDiagonal=given.moments_com.tolist())
     if not given.as_installed:
         _switch_off(bullet, body, -1)
     bullet.resetBaseVelocity(body, (getattr(given, "v_WB0", 0) + np.cross(given.w0_W, arm)).tolist(), given.w0_W.tolist())
     return body
+
+
+OF_FILES = ("file", "setter", "rewritten", "mass", "scaled")
+"""Descriptions of a body by a file."""
+
+
+def _build_from_file(bullet, given):
+    """Return a body that is loaded from a file, and then changed.
+
+    A saved file is the one of PyBullet's `UrdfEditor`; `saveWorld` writes the names of the loaded files only. The Quickstart
+    Guide has the mass of `changeDynamics` apart from the inertia, so the file has the inertia and another mass. `globalScaling`
+    scales the size, not the mass (bullet3 2379), so the file has the inertia of a body of this mass and another size.
+    """
+    description, part = description_of(given), -1 if given.free else 0
+    if given.body == "maximal":
+        raise NotImplementedError("the file has no shape, which a body in maximal coordinates needs")
+    if description == "rewritten" and not given.free:
+        raise NotImplementedError("UrdfEditor does not write spherical joints")
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "body.urdf"
+        file.write_text(write_file(given))
+        options = {"flags": bullet.URDF_USE_INERTIA_FROM_FILE, "useFixedBase": not given.free}
+        body = bullet.loadURDF(str(file), globalScaling=OTHER_SIZE if description == "scaled" else 1.0, **options)
+        if description == "rewritten":
+            from pybullet_utils.urdfEditor import UrdfEditor
+
+            editor = UrdfEditor()
+            editor.initializeFromBulletBody(body, 0)
+            editor.saveUrdf(f"{folder}/saved.urdf")
+            bullet.removeBody(body)
+            body = bullet.loadURDF(f"{folder}/saved.urdf", **options)  # another name: Bullet caches files by their names
+    if description == "setter":
+        bullet.changeDynamics(body, part, mass=given.mass, localInertiaDiagonal=given.moments_com.tolist())
+    if description == "mass":
+        bullet.changeDynamics(body, part, mass=given.mass)
+    if not given.free:
+        return _hold(bullet, body, given)
+    if not given.as_installed:
+        _switch_off(bullet, body, -1)
+    bullet.resetBasePositionAndOrientation(body, [0, 0, 0], _x_first(_product(given.q0, _inertial_axes(bullet, body))))
+    bullet.resetBaseVelocity(body, [0, 0, 0], given.w0_W.tolist())
+    return body
+
+
+def write_file(given):
+    """Return the URDF file that is loaded first. A body about a fixed point has its principal axes, as in `_build_held`."""
+    factors = {
+        "setter": {"mass": OTHER_MASS, "inertia": OTHER_MASS},
+        "mass": {"mass": OTHER_MASS},
+        "scaled": {"length": 1 / OTHER_SIZE, "inertia": OTHER_SIZE**-2},
+    }
+    written = rescaled(given, **factors.get(description_of(given), {}))
+    if given.free:
+        return write_urdf(written)
+    written.com, written.inertia_com = written.com @ _matrix(given.q_com), np.diag(written.moments_com)
+    ball = '<link name="base"/><joint name="ball" type="spherical"><parent link="base"/><child link="body"/></joint></robot>'
+    return write_urdf(written).replace("</robot>", ball)
+
+
+def _inertial_axes(bullet, body):
+    """Return the attitude of the principal axes in the file's axes, by Bullet; a body's pose is the one of these axes."""
+    x, y, z, w = bullet.getDynamicsInfo(body, -1)[4]
+    return np.array([w, x, y, z])
 
 
 def _build_held(bullet, given):
@@ -117,7 +178,7 @@ def _build_held(bullet, given):
     The link's frame is at the fixed point, and its axes are the principal axes about the centre of mass: in other axes the
     state of the joint is not the attitude of the link.
     """
-    q0, R = _product(given.q0, given.q_com), _matrix(given.q_com)
+    R = _matrix(given.q_com)
     link = {
         **{"linkMasses": given.mass, "linkCollisionShapeIndices": -1, "linkVisualShapeIndices": -1, "linkParentIndices": 0},
         **{"linkPositions": [0, 0, 0], "linkOrientations": [0, 0, 0, 1], "linkInertialFrameOrientations": [0, 0, 0, 1]},
@@ -125,6 +186,12 @@ def _build_held(bullet, given):
     }
     body = bullet.createMultiBody(0, -1, linkJointAxis=[[0, 0, 1]], **{name: [value] for name, value in link.items()})
     bullet.changeDynamics(body, 0, localInertiaDiagonal=given.moments_com.tolist())
+    return _hold(bullet, body, given)
+
+
+def _hold(bullet, body, given):
+    """Set the initial state of a body on a spherical joint, whose axes are the principal ones, and return it."""
+    q0, R = _product(given.q0, given.q_com), _matrix(given.q_com)
     if not given.as_installed:
         for part in (-1, 0):
             _switch_off(bullet, body, part)

@@ -1,5 +1,6 @@
 """Functions that several adapters share. They run in the environments of engines and import nothing of this package."""
 
+import copy
 import math
 from functools import lru_cache, partial
 
@@ -13,6 +14,9 @@ FAR_PLACE, FAR_MASS = (1000.0, 200.0, 30.0), 3.0
 
 LATER = 1000.0
 """Initial time, s, in the description "time"."""
+
+OTHER_MASS, OTHER_SIZE = 2.0, 2.0
+"""Factors of the mass before it is set, in the description "mass", and of the size to which a body is scaled, in "scaled"."""
 
 PER_BODY = ("body_mass", "body_subtreemass", "body_inertia", "body_ipos", "body_iquat", "body_invweight0", "dof_invweight0")
 """Arrays of a MuJoCo model that depend on the body."""
@@ -149,6 +153,14 @@ def description_of(given):
     return getattr(given, "description", "")
 
 
+def rescaled(given, mass=1.0, length=1.0, inertia=1.0):
+    """Return the numbers of the body with its mass, its centre of mass and its inertia multiplied by factors."""
+    other = copy.copy(given)
+    other.mass, other.com = given.mass * mass, given.com * length
+    other.inertia_com, other.moments_com = given.inertia_com * inertia, given.moments_com * inertia
+    return other
+
+
 def halves(given):
     """Return the mass and the inertia (3, 3), kg m^2, of each part of the body: two if it has a fixed child."""
     share = (0.25, 0.75) if description_of(given) == "child" else (1.0,)
@@ -164,23 +176,41 @@ def write_urdf(given):
     return f'<robot name="body"><link name="body"><inertial>{inertial}</inertial></link></robot>'
 
 
+def _write_cube(given):
+    """Return the body as a mesh, a cube of 2 m that is scaled along its axes, with a density, and the geom of the mesh.
+
+    The inertia of a mesh is a product of the density and five lengths.
+    """
+    moments, vector = mujoco_moments(given), lambda values: " ".join(map(repr, values.tolist()))
+    sides = np.sqrt(1.5 * (moments.sum() - 2 * moments) / given.mass)
+    corners = " ".join(f"{x} {y} {z}" for x in (-1, 1) for y in (-1, 1) for z in (-1, 1))
+    density = float(given.mass / (8 * sides.prod()))
+    mesh = f'<asset><mesh name="cube" vertex="{corners}" scale="{vector(sides)}"/></asset>'
+    place = f'pos="{vector(given.com)}" quat="{vector(given.q_com)}"'
+    return mesh, f'<geom type="mesh" mesh="cube" density="{density!r}" {place}/>'
+
+
 def write_mjcf(given, option="", shape=""):
     """Return the body as an MJCF file, on a free joint or on a ball joint at the fixed point."""
+    if description_of(given) == "mass":
+        given = rescaled(given, mass=OTHER_MASS, inertia=OTHER_MASS)
     inertial = {"mass": np.array([given.mass]), "pos": given.com, "quat": given.q_com, "diaginertia": mujoco_moments(given)}
     attributes = " ".join(f'{name}="{" ".join(map(repr, values.tolist()))}"' for name, values in inertial.items())
-    description, kind = description_of(given), "free" if given.free else "ball"
+    description, kind, asset = description_of(given), "free" if given.free else "ball", ""
     zero = 'damping="0" armature="0" frictionloss="0"' if description == "damping" else ""
     joint = f'<joint type="{kind}" {zero}/>'
     if description == "joints" and given.free:
         joint = "".join(f'<joint type="slide" axis="{axis}"/>' for axis in ("1 0 0", "0 1 0", "0 0 1")) + '<joint type="ball"/>'
     inertia = f"<inertial {attributes}/>"
+    if description == "scaled":
+        (asset, shape), inertia = _write_cube(given), ""
     inertia = f"<body>{inertia}</body>" if description == "child" else inertia
     x, y, z = FAR_PLACE
     inertial = f'<inertial pos="0 0 0" mass="{FAR_MASS:g}" diaginertia="3 4 5"/>'
     far = f'<body pos="{x:g} {y:g} {z:g}"><freejoint/>{inertial}</body>' if description == "world" else ""
     return f"""
         <mujoco>
-          {option}
+          {option}{asset}
           <worldbody>
             {far}<body name="body">{joint}{inertia}{shape}</body>
           </worldbody>

@@ -36,7 +36,7 @@ def pair_blocks(findings: Iterable[Finding]) -> list[Block]:
         f"{finding.subject}: {finding.case}": finding.detail for finding in some if finding.relation not in (*NOT_RUN, *PLAIN)
     }
     return filled(
-        Items([Item(group[0].detail, _names(group), True) for group in groups]),
+        Items([Item(_words(group[0]), _names(group), True) for group in groups]),
         Table(HEAD, reduced, "Pairs that differ, reduced: the first of each group"),
         *(_table(engine, [finding for finding in some if finding.subject == engine]) for engine in engines),
         Items([Item(text, what) for what, text in other.items()]),
@@ -47,6 +47,12 @@ def pair_blocks(findings: Iterable[Finding]) -> list[Block]:
 
 PLAIN = (Relation.SAME_BITS, Relation.EQUAL, Relation.DIFFERS, Relation.CRASHES)
 """Relations that the tables explain."""
+
+
+def _words(finding: PairFinding) -> str:
+    """Return the mistakes that explain a pair that differs, and how it differs."""
+    causes = [f"{cause.sentence} (leaves {number(cause.left)} of {number(cause.of)} rad)" for cause in finding.causes]
+    return "; ".join(filter(None, (". Or: ".join(causes), finding.detail)))
 
 
 def _grouped(wrong: Sequence[PairFinding]) -> list[list[PairFinding]]:

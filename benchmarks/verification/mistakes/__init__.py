@@ -29,6 +29,7 @@ from .samples import RESAMPLED
 from .scenes import BODIES, DIGITS, SCENES
 from .steps import INTEGRATORS
 from .times import ROW_TIMES, TIMES
+from .wrapped import KEPT, SAVED
 
 
 def table_of(mistakes: Iterable[Mistake]) -> Mapping[str, Mistake]:
@@ -43,7 +44,7 @@ def table_of(mistakes: Iterable[Mistake]) -> Mapping[str, Mistake]:
 
 BY_KEY = table_of([
     *READINGS, *TIMES, *ROW_TIMES, *SCENES, DIGITS, *BODIES, *EQUATIONS, *INTEGRATORS, *RULES, *DRIFTS,
-    *HABITS, *STANDSTILLS, *PART_STANDSTILLS, *ROWS, *OTHER_ROWS, *RESAMPLED, *FITTED,
+    *HABITS, *STANDSTILLS, *PART_STANDSTILLS, *ROWS, *OTHER_ROWS, *RESAMPLED, *FITTED, *SAVED, *KEPT,
     *(mistake for mistake in LOADED if mistake.key not in {scene_mistake.key for scene_mistake in SCENES}),
     *(mistake for mistake in FILES if mistake.key not in {other.key for other in (*SCENES, *LOADED)}),
 ])  # fmt: skip

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -89,7 +90,7 @@ class Description:
     def numbers(self) -> dict[str, Any]:
         """The numbers of a `prepare` request, see PROTOCOL.md.
 
-        `moments` are the diagonal of `joint_inertia`: with the variant "frame" only, they are not the principal moments.
+        `moments` are the diagonal of `joint_inertia`: with the variants `TURNED` only, they are not the principal moments.
         """
         w0_W, x0, grid = self.R0 @ self.w0, self.R0 @ self.com, self.grid
         moments, axes = np.diag(self.inertia).copy(), np.eye(3)
@@ -217,7 +218,13 @@ def _without_moment(body: Description) -> Description:
     return replace(body, inertia=body.inertia * (np.arange(3)[:, None] != np.argmax(np.abs(body.w0))), variant="zero")
 
 
-OF_INERTIA = ("frame", "offset", "file", "setter", "child", "joints", "saved")
+WRAPPED = MappingProxyType({"rewritten": "file loaded and saved", "mass": "mass set after loading", "scaled": "scaled"})
+"""Names of pairs, by their variants, in which an engine changes a file that it has loaded. Their axes are not principal."""
+TURNED = ("frame", *WRAPPED)
+"""Variants whose axes F are not principal."""
+LOADED = ("file", "setter", "saved", *WRAPPED)
+"""Variants in which a mistake of a loader, a writer or a setter gives the engine another body."""
+OF_INERTIA = ("frame", "offset", "file", "setter", "child", "joints", "saved", *WRAPPED)
 """Variants that are about the inertia."""
 FREE = ("body", "needle", "thin rod")
 """Names of the free bodies with these variants."""
@@ -263,6 +270,17 @@ PAIRS = (
     ),
     Pair("offset frame", lambda d: replace(reframe(d, np.eye(3), OFFSET), variant="offset"), variant="offset", bodies=FREE),
     Pair("moment of 0 about the axis of rotation", _without_moment, variant="zero", bodies=("rod about its axis",)),
+    *(
+        Pair(
+            name,
+            lambda d, variant=variant: replace(reframe(d, OTHER), variant=variant),
+            frame_back(OTHER),
+            variant=variant,
+            bodies=(*FREE, "top"),
+            relation="The engine changes a file of the same body, in axes turned by 1.3 rad about (0.3, -0.5, 0.8).",
+        )
+        for variant, name in WRAPPED.items()
+    ),
     *(
         Pair(
             name,

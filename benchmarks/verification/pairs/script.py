@@ -18,7 +18,7 @@ from conservative.references.engines import shared
 from conservative.references.environments.adapter import AdapterMethod
 from conservative.registry import read_name
 
-from .pairs import Description, Pair
+from .pairs import WRAPPED, Description, Pair
 
 MARK = "conservative pairs: "
 """Text in the first line of every script, by which an earlier one is recognized."""
@@ -29,29 +29,51 @@ SAME = {"rapier_deterministic": "rapier_js"}
 """Engines that have the script of another one."""
 IN_THE_NUMBERS = ("", "quaternion", "frame", "zero")
 """Variants that change numbers only, so that every template has them."""
-ALSO = {"mujoco": ("offset", "file", "child", "joints", "world", "damping"), "rapier_js": ("setter",)}
+ALSO = {"mujoco": ("offset", "file", "child", "joints", "world", "damping", *WRAPPED), "rapier_js": ("setter",)}
 """Further variants that a template has, by its name."""
+OF_FILES = {"pybullet": tuple(WRAPPED)}
+"""Variants with a template of their own, by engine: it shows the body that the engine has, not its motion."""
+THEN = {
+    ("mujoco", "rewritten"): (
+        'mujoco.mj_saveLastXML("saved.xml", second)\nsecond = mujoco.MjModel.from_xml_path("saved.xml")\n'
+    ),
+    ("mujoco", "mass"): "mujoco.mj_setTotalmass(second, $mass)\n",
+    ("pybullet", "rewritten"): (
+        "editor = UrdfEditor()\neditor.initializeFromBulletBody(body, 0)\neditor.saveUrdf('saved.urdf')\n"
+        "body = p.loadURDF('saved.urdf', **options)\n"
+    ),
+    ("pybullet", "mass"): "p.changeDynamics(body, $part, mass=$mass)\n",
+}
+"""What an engine does with the file that it has loaded, by engine and variant."""
 
 
 def script_of(method: Method, pair: Pair, first: Description, scale: float | None) -> str:
     """Return the script of a pair that differs, for the engine's own language; "" if the engine has none for it."""
     family = read_name(method.family).base
-    file = FOLDER / f"{SAME.get(family, family)}.txt"
-    variants = IN_THE_NUMBERS + ALSO.get(file.stem, ())
+    engine = SAME.get(family, family)
+    of_file = pair.variant in OF_FILES.get(engine, ())
+    file = FOLDER / f"{engine}{'.files' * of_file}.txt"
+    variants = IN_THE_NUMBERS + (OF_FILES if of_file else ALSO).get(engine, ())
     # A template makes one run of each description, from its start.
     if not isinstance(method, AdapterMethod) or not file.is_file() or pair.run or pair.variant not in variants:
         return ""
-    # Only MuJoCo's template has weight and a fixed point. All switch off sleep and damping, which `as_installed` keeps.
-    if (first.gravity and file.stem != "mujoco") or method.settings.get("as_installed"):
+    # Only MuJoCo's template has weight and a fixed point. Those with motions switch off sleep and damping, which `as_installed`
+    # keeps.
+    if not of_file and ((first.gravity and file.stem != "mujoco") or method.settings.get("as_installed")):
         return ""
     second = pair.second(first) if scale is None else pair.second(first, scale)
     texts: dict[str, Any] = {"n_steps": first.n_steps, "package": method.data.package}
     for name, description in (("first", first), ("second", second)):
         numbers = _numbers(description)
         text = json.dumps(numbers) if file.stem in SCRIPTS_OF_NODE else repr(numbers)
-        texts |= {name: text, f"{name}_q": numbers["q"], f"{name}_w": numbers["w"], f"{name}_dt": description.dt}
+        texts |= {name: text, f"{name}_q": numbers["q"], f"{name}_w": numbers["w"]}
         if file.stem == "mujoco":
             texts[f"{name}_mjcf"] = _mjcf(method, description)
+        if of_file:
+            texts[f"{name}_file"] = method.adapter.write_file(SimpleNamespace(**description.numbers))
+    texts |= {"mass": first.mass, "moments": first.numbers["moments_com"].tolist(), "held": bool(first.gravity)}
+    texts |= {"part": 0 if first.gravity else -1, "size": shared.OTHER_SIZE if pair.variant == "scaled" else 1.0}
+    texts["then"] = Template(THEN.get((engine, pair.variant), "")).substitute(texts)
     # Newton's settings are names of its solvers; MuJoCo_rk4 is its solver MuJoCo with an option.
     solver, _, integrator = str(method.settings.get("solver", "")).partition("_")
     options = f', integrator="{integrator}", disable_contacts=True' if integrator else ", angular_damping=0.0"

@@ -21,8 +21,9 @@ from conservative.method import Method
 from conservative.references.worker.client import EngineCrashed, EngineError
 
 from ..compare import largest_difference
-from ..finding import Finding, Verdict
-from .pairs import OF_INERTIA, PAIRS, Description, Pair, Samples, frame_back, to_principal
+from ..finding import Cause, Finding, Verdict
+from .causes import find_causes, usual
+from .pairs import LOADED, OF_INERTIA, PAIRS, TURNED, Description, Pair, Samples, frame_back, to_principal
 from .runner import NotAvailable, Runner, run, runner_of
 from .script import script_name, script_of
 
@@ -193,7 +194,7 @@ class Engine:
                 # An engine moves such an inertia to the centre or to principal axes, with rounding of its largest part.
                 J = J + eps * (body.mass * (body.com @ body.com) + np.abs(J).max()) * (rough + rough.T) / 2
             moved = replace(body, R0=rotation_about(axis, eps) @ body.R0, w0=body.w0 * (1 + eps * factor[0]), inertia=J)
-            moved, R_FG = (moved, np.eye(3)) if body.variant == "frame" else to_principal(moved)
+            moved, R_FG = (moved, np.eye(3)) if body.variant in TURNED else to_principal(moved)
             with suppress(NotAvailable, IntegrationFailed):
                 largest = max(largest, difference(samples, frame_back(R_FG)(self.runner.model(moved)())))
         steps = math.sqrt(body.n_steps) if self.runner.adaptive else body.n_steps
@@ -352,19 +353,22 @@ class _Pair:
             return self.finding(Relation.SAME_LIMIT, apart, detail, threshold=threshold)
         if adaptive:
             return self.with_tolerance(apart)
-        if not lost and not pair.same_bits and apart.value < OWN_SHARE * (own := _own_error(engine, description)):
+        causes = () if lost else _causes(engine, pair, description, apart)
+        if not (lost or pair.same_bits or causes) and apart.value < OWN_SHARE * (own := _own_error(engine, description)):
             detail = f"the difference of {apart.value:.2g} is a small share of the error of the step, {own:.2g}"
             return self.finding(Relation.NEGLIGIBLE, replace(apart, allowed=OWN_SHARE * own), detail, threshold=threshold)
         first = _reduce(description, pair, scale, lambda candidate: wrong(candidate) and stays(candidate))
         motion = apart.failure or _describe_motion(engine, pair, first, scale)
-        return self.wrong(apart, first, motion, threshold)
+        return self.wrong(apart, first, motion, threshold, causes)
 
-    def wrong(self, apart: Apart, first: Description, motion: str, threshold: str = "") -> PairFinding:
+    def wrong(
+        self, apart: Apart, first: Description, motion: str, threshold: str = "", causes: tuple[Cause, ...] = ()
+    ) -> PairFinding:
         """Return the finding on a pair that differs, with the data that repeats it."""
         size = f"{apart.value / apart.allowed:.2g} times the allowed difference" if apart.allowed else "not the same bits"
         detail = "; ".join(filter(None, (threshold, "" if math.isinf(apart.value) else size, motion)))
         relation = Relation.CRASHES if apart.crashed else Relation.DIFFERS
-        repeat = {"threshold": threshold, "first": first, "scale": apart.scale, "request": _plain(first)}
+        repeat = {"causes": causes, "threshold": threshold, "first": first, "scale": apart.scale, "request": _plain(first)}
         if script := script_of(self.method, self.pair, first, apart.scale):
             repeat |= {"script": script, "script_file": script_name(self.method, self.pair.name)}
         return self.finding(relation, apart, detail, **repeat)
@@ -379,6 +383,20 @@ class _Pair:
             if _apart(Engine(looser), pair, description, apart.scale).value > 2 * apart.value:
                 return self.finding(Relation.SAME_LIMIT, apart, "the difference falls with the tolerance")
         return self.wrong(apart, description, _describe_motion(engine, pair, description, apart.scale))
+
+
+def _causes(engine: Engine, pair: Pair, description: Description, apart: Apart) -> tuple[Cause, ...]:
+    """Return mistakes with which a body that is made as usual moves as the one that the engine loads, sets or scales."""
+    if pair.variant not in LOADED:
+        return ()
+    second = pair.second(description, *_scaled(apart.scale))
+    samples = engine.runner.model(second)()
+
+    def leaves(body: Description) -> float:
+        turned, back = usual(body)
+        return difference(samples, back(engine.runner.model(turned)()))
+
+    return find_causes(second, apart.value, apart.allowed, leaves)
 
 
 def _plain(description: Description) -> Mapping[str, object]:
