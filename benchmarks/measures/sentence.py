@@ -20,7 +20,8 @@ def change_of(errors: tuple[float, float], orders: tuple[float, float], first_ba
     Parameters
     ----------
     errors
-        Attitude errors before and now, rad; nan if one is not known. Errors that are equal in two digits are left out.
+        Attitude errors before and now, rad; nan if one is not known. Errors that are equal in two digits are left out,
+        and so are errors that fell if there is a `first_bad`: it is no improvement.
     orders
         Orders of convergence before and now; nan if one is not known. Orders that differ by less than 0.2 are left out.
     first_bad
@@ -30,7 +31,8 @@ def change_of(errors: tuple[float, float], orders: tuple[float, float], first_ba
     """
     was, now = (f"{error:.2g}" for error in errors)
     numbers = []
-    if was != now and abs(errors[1] - errors[0]) > SAME_ERROR * errors[0]:  # False for nan
+    fell = errors[1] < errors[0]
+    if was != now and abs(errors[1] - errors[0]) > SAME_ERROR * errors[0] and not (fell and first_bad):  # False for nan
         numbers.append(f"attitude error {was} to {now} rad")
     if abs(orders[1] - orders[0]) >= SAME_ORDER:  # False for nan
         numbers.append(f"order {orders[0]:.1f} to {orders[1]:.1f}")

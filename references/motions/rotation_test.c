@@ -15,7 +15,7 @@ namespace exact_rotations {
 enum { ORDER = 2, /* the order of your integrator: 1, 2 or 4 (2 for order 3) */
        SINGLE = 0 /* 1 for single precision */ };
 static const double ANGLE = 0.01; /* |w| h in rad; 0.03 and 0.1 with the files of all motions */
-static const char HAS[] = "";     /* features of your engine: "rotor, torque, damping, fixed point, orbit"; other motions are skipped */
+static const char HAS[] = "";     /* what `simulate` reads of `m`: "rotor, torque, damping, fixed point, orbit"; other motions are skipped */
 
 typedef struct { /* SI units; inertia about the centre of mass or the fixed point; quaternions have the scalar first, body to world */
   double inertia_B[9], quaternion_wxyz0[4], w_WB_B0[3];
@@ -36,15 +36,20 @@ static void simulate(const Motion *m, double h, int steps, int samples, double s
 /* END */
 
 #define NEAR_ENOUGH 0.2 /* mean square of logarithms: errors over the errors of a mistake that explains them */
+#define LARGE 0.08      /* errors that show two mistakes */
 #define LARGEST 1e6     /* instead of errors that are not finite */
+#define UNSET 1.2345e300 /* a number that `simulate` has not stored */
+#define FEATURES "rotor, torque, damping, fixed point, orbit"
 #define HEADER "# Known errors on exact motions. A later run fails if a motion is worse or has another mistake. Written by --record."
 enum { MOST = 128 };
 typedef struct {
   const Motion *motion;
   double found[4], limit[4], apart[MOST], order, above, falls; /* apart: distances of mistakes, -1 if they do not explain it */
   int most, failed, near, mistake;                             /* the largest error, the number of explanations, the named one or -1 */
+  int fresh, same, worse[2], lower[2];                         /* against known errors: fresh for a new failure, same for the mistake */
+  struct Known *was;
 } Result;
-typedef struct { char name[48], mistake[48]; double error[2]; int seen; } Known;
+typedef struct Known { char name[48], mistake[48]; double error[2]; int seen, count; } Known;
 static Motion motions[MOST];
 static Result results[MOST];
 static Known known[2 * MOST];
@@ -62,6 +67,16 @@ static const char *copy_field(char *to, size_t size, const char *at, const char 
   size_t n = strcspn(at, ends), fits = n < size ? n : size - 1;
   memcpy(to, at, fits), to[fits] = 0;
   return at[n] ? at + n + 1 : at + n;
+}
+
+/* Whether a list as in `HAS` has a part. */
+static int has(const char *list, const char *part) {
+  char each[64];
+  while (*list) {
+    list = copy_field(each, sizeof each, list + strspn(list, " "), ",");
+    if (!strcmp(each, part)) return 1;
+  }
+  return 0;
 }
 
 /* Return what follows a key and a comma, or NULL if the line has another key. */
@@ -145,13 +160,16 @@ static double invariants(const Motion *m, const double *y, double *momentum) {
 }
 
 /* The largest errors of attitude (rad), rates, energy and momentum, with so many steps before each sample. */
-static void worst(const Motion *m, int steps, double *out) {
+static int worst(const Motion *m, int steps, double *out) {
   double state[24][7], l[3], l0[3], e[4];
-  for (int i = 0; i < 24 * 7; i++) state[i / 7][i % 7] = NAN;
+  for (int i = 0; i < 24 * 7; i++) state[i / 7][i % 7] = UNSET;
   simulate(m, m->sample[0][0] / steps, steps, m->samples, state);
   memset(out, 0, 4 * sizeof *out);
   for (int n = 0; n < m->samples; n++) {
     const double *y = state[n], *exact = m->sample[n] + 1;
+    if (y[0] == UNSET) return refuse("%s: simulate returned %d states, expected %d", m->name, n, m->samples);
+    for (int k = 1; k < 7; k++)
+      if (y[k] == UNSET) return refuse("%s: simulate returned another state, expected a quaternion (4) and rates (3)", m->name);
     double near_ = 0, far_ = 0, dw = 0, dl = 0;
     e[2] = fabs(invariants(m, y, l) - invariants(m, exact, l0)) / m->scale[1];
     for (int i = 0; i < 4; i++) near_ += pow(y[i] - exact[i], 2), far_ += pow(y[i] + exact[i], 2);
@@ -160,6 +178,7 @@ static void worst(const Motion *m, int steps, double *out) {
     e[0] = 4 * asin(near_ > 1 ? 1 : near_), e[1] = sqrt(dw) / m->scale[0], e[3] = sqrt(dl) / m->scale[2];
     for (int k = 0; k < 4; k++) out[k] = !(e[k] < LARGEST) ? LARGEST : e[k] > out[k] ? e[k] : out[k];
   }
+  return 1;
 }
 
 /* Run a motion: its errors, the mistakes that explain them, and the order (-1 if it is not measured). */
@@ -169,7 +188,8 @@ static int check(const Motion *m, Result *r) {
   for (int n = 0; n < m->tolerances; n++)
     if (m->tolerance[n][0] == ORDER && m->tolerance[n][1] == ANGLE) row = m->tolerance[n];
   if (!row) return refuse("%s has no tolerance for order %d and |w| h = %g rad", m->name, (int)ORDER, ANGLE);
-  memset(r, 0, sizeof *r), worst(m, (int)row[2], r->found);
+  memset(r, 0, sizeof *r);
+  if (!worst(m, (int)row[2], r->found)) return 0;
   r->motion = m, r->order = r->mistake = -1;
   for (int k = 0; k < 4; k++) {
     r->limit[k] = row[3 + k] + SINGLE * m->single;
@@ -177,7 +197,7 @@ static int check(const Motion *m, Result *r) {
   }
   double ratio = r->found[r->most] / r->limit[r->most];
   if (!m->features[0] || ratio > 1) {
-    worst(m, 2 * (int)row[2], half);
+    if (!worst(m, 2 * (int)row[2], half)) return 0;
     if (!m->features[0] && r->found[0] < LARGEST && half[0] > (SINGLE ? m->single : 1e-11)) /* above rounding */
       r->order = r->found[0] > half[0] ? log(r->found[0] / half[0]) / log(2) : 0;
     if (r->found[r->most] < LARGEST && half[r->most] > 0) r->falls = log(r->found[r->most] / half[r->most]) / log(2);
@@ -193,12 +213,23 @@ static int check(const Motion *m, Result *r) {
     if (r->mistake < 0 || apart < r->apart[r->mistake]) r->mistake = n;
   }
   r->failed = ratio > 1 && !(r->falls >= ORDER - 0.5 && (ratio <= 2 || !r->near));
+  int none = r->failed && !r->near; /* a large error of the attitude alone, or of the rates alone, is still there beside another mistake */
+  for (int n = 0; none && n < MOST; n++) {
+    const double *x = m->catches[n];
+    int k = x[0] < x[1];
+    if (!m->caught[n] || x[1 - k] != 0 || x[k] <= LARGE || fabs(log(fmax(r->found[k], r->limit[k]) / x[k])) >= 0.03) continue;
+    r->apart[n] = NEAR_ENOUGH, r->near++;
+    if (r->mistake < 0) r->mistake = n;
+  }
   r->above = r->failed || ratio <= 1 ? 0 : 100 * (ratio - 1);
   return 1;
 }
 
-/* Name the mistake of each motion that fails: those that explain most motions. Print them, if asked. */
-static void name_mistakes(int failed, int say, double order) {
+/* Whether a motion is one of those to name a mistake of: new failures, or all. */
+static int counts(const Result *r, int fresh) { return fresh ? r->fresh : r->failed; }
+
+/* Name the mistake of each motion that fails, those that explain most motions first. Print lines about them, if asked. */
+static void summary(int failed, int fresh, int say, double order) {
   int done[MOST] = {0}, rest = failed;
   for (int round = 0; round < 3; round++) {
     int best = -1, most = 0;
@@ -208,25 +239,25 @@ static void name_mistakes(int failed, int say, double order) {
       double sum = 0;
       for (int i = 0; i < result_count; i++) {
         shown += results[i].motion->caught[n] > 0;
-        if (results[i].failed && !done[i] && results[i].apart[n] >= 0) votes++, sum += results[i].apart[n];
+        if (counts(&results[i], fresh) && !done[i] && results[i].apart[n] >= 0) votes++, sum += results[i].apart[n];
       }
       sum += 1e-9 * shown; /* of two that explain the same, the one that fewer motions show */
       if (votes > most || (votes && votes == most && sum < least)) best = n, most = votes, least = sum;
     }
     if (best < 0 || 10 * most < failed) break;
-    if (say) printf("\"%s\" explains %d of them\n", mistakes[best], most);
+    if (say && fresh) printf("\"%s\" explains %d of %d new failures\n", mistakes[best], most, failed);
+    else if (say) printf("\"%s\" explains %d of them\n", mistakes[best], most);
     for (int i = 0; i < result_count; i++)
-      if (results[i].failed && !done[i] && results[i].apart[best] >= 0) done[i] = 1, results[i].mistake = best;
+      if (counts(&results[i], fresh) && !done[i] && results[i].apart[best] >= 0) done[i] = 1, results[i].mistake = best;
     rest -= most;
   }
   if (say && 2 * rest > failed && order >= 0.5 && order < ORDER - 0.5)
     printf("this program has order %.1f, %d was declared\n", order, (int)ORDER);
-  if (say && rest) {
-    printf("%d not explained by a mistake:", rest);
-    for (int i = 0, n = 0; i < result_count; i++)
-      if (results[i].failed && !done[i] && n < 5) printf("%s %s", n++ ? "," : "", results[i].motion->name);
-    printf("\n");
-  }
+  if (!say || !rest) return;
+  printf("%d not explained by a mistake:", rest);
+  for (int i = 0, n = 0; i < result_count; i++)
+    if (counts(&results[i], fresh) && !done[i] && n < 5) printf("%s %s", n++ ? "," : "", results[i].motion->name);
+  printf("\nWhat now: references/motions/my_engine_fails.md of conservative-rotation\n");
 }
 
 /* A number with so many digits. */
@@ -235,11 +266,18 @@ static const char *short_number(double x, int digits, char *out) {
   return sprintf(out, fixed ? "%.*f" : "%.*e", digits - 1 - (fixed ? (int)floor(log10(x)) : 0), x), out;
 }
 
+/* An error in two digits of the three that are recorded, so that the same number looks the same. */
+static const char *two(double x, const char *unit, char *out) {
+  sprintf(out, "%.2e", x);
+  return x < LARGEST ? sprintf(out, "%.1e%s", strtod(out, NULL), unit) : sprintf(out, "not finite"), out;
+}
+
 static const char *mistake_name(const Result *r) { return r->mistake < 0 ? "no known mistake" : mistakes[r->mistake]; }
 
 static void print_error(const Result *r, int k) {
   const char *names[] = {"attitude", "rates", "energy", "momentum"};
-  printf("%s: %s error %.1e%s", r->motion->name, names[k], r->found[k], k ? "" : " rad");
+  char text[32];
+  printf("%s: %s error %s", r->motion->name, names[k], two(r->found[k], k ? "" : " rad", text));
 }
 
 static int compare_numbers(const void *a, const void *b) {
@@ -265,7 +303,7 @@ static int read_known(const char *path, double *order) {
       good = numbers(at, ',', order, 1) == 1;
     } else if ((at = values_of(line, "motions")) && known_count < 2 * MOST) {
       Known *one = &known[known_count++];
-      at = copy_field(one->name, sizeof one->name, at, ","), one->seen = 0;
+      at = copy_field(one->name, sizeof one->name, at, ","), one->seen = one->count = 0;
       good = numbers(at, ',', one->error, 2) == 2 && (at = strchr(at, ',')) && (at = strchr(at + 1, ',')) && !strchr(at + 1, ',');
       if (good) copy_field(one->mistake, sizeof one->mistake, at + 1, ",");
     } else {
@@ -301,62 +339,74 @@ static int write_known(const char *path, double order) {
 /* Compare with the known errors, print what is new, and return the number of motions that are worse; -1 if it is not possible. */
 static int compare_known(const char *path, double order) {
   double before, was = 0, is = 0;
-  int count[2 * MOST] = {0}, sum = 0, worse = 0, shown = 0;
-  char first[128] = "", a[32], b[32];
+  int sum = 0, fresh = 0, worse, shown = 0;
+  char a[32], b[32];
+  const Result *first = NULL;
   if (!read_known(path, &before)) return -1;
   for (int i = 0; i < result_count; i++) {
-    const Result *r = &results[i];
-    Known *one = NULL;
+    Result *r = &results[i];
     for (int n = 0; n < known_count; n++)
-      if (!strcmp(known[n].name, r->motion->name)) one = &known[n], one->seen = 1;
-    int same = 0, above[2] = {1, 1};
-    for (int k = 0; one && k < 2; k++) above[k] = r->found[k] > 1.005 * one->error[k] + r->limit[k]; /* it has three digits */
-    if (one) same = one->mistake[0] ? r->apart[number_of(one->mistake) % MOST] >= 0 : !r->near;
-    if (one && !r->motion->features[0]) was = fmax(was, one->error[0]), is = fmax(is, r->found[0]);
-    if (r->failed && (!same || above[0] || above[1])) {
-      int k = one ? above[1] && !above[0] : r->most;
-      print_error(r, k);
-      if (one) {
-        printf(", was %.1e; %s", one->error[k], mistake_name(r));
-        if (!same) printf(", was %s", one->mistake[0] ? one->mistake : "no known mistake");
-      } else printf(", tolerance %.1e, not recorded; %s", r->limit[k], mistake_name(r));
-      printf("\n");
-      if (!first[0]) sprintf(first, "%s (%s)", r->motion->name, mistake_name(r));
-      worse++;
-      continue;
+      if (!strcmp(known[n].name, r->motion->name)) r->was = &known[n], known[n].seen = 1;
+    const Known *one = r->was;
+    for (int k = 0; one && k < 2; k++) {
+      double margin = 0.01 * one->error[k] + r->limit[k]; /* recorded numbers have three digits */
+      r->worse[k] = r->found[k] > one->error[k] + margin, r->lower[k] = r->found[k] < one->error[k] - margin;
     }
-    if (r->failed) count[one - known] = 1, sum++;
-    for (int k = 0; one && k < 2; k++)
-      if (one->error[k] - r->found[k] > r->limit[k] + 0.005 * one->error[k]) {
-        printf("better: %s, %.1e to %.1e%s: record again to tighten\n", r->motion->name, one->error[k], r->found[k], k ? " (rates)" : " rad");
-        break;
-      }
+    int no_worse = one && !r->worse[0] && !r->worse[1];
+    if (one) r->same = one->mistake[0] ? r->apart[number_of(one->mistake) % MOST] >= 0 : !r->near;
+    if (one && !r->motion->features[0]) was = fmax(was, one->error[0]), is = fmax(is, r->found[0]);
+    if (!no_worse) r->lower[0] = r->lower[1] = 0;
+    r->fresh = r->failed && !(no_worse && (r->same || r->lower[0] || r->lower[1]));
+    fresh += r->fresh;
+  }
+  summary(worse = fresh, 1, 0, order);
+  for (int i = 0; i < result_count; i++) {
+    const Result *r = &results[i];
+    Known *one = r->was;
+    int k = one ? r->worse[1] && !r->worse[0] : r->most;
+    if (r->fresh && !first) first = r;
+    if (r->fresh) print_error(r, k);
+    if (r->fresh && !one) printf(", tolerance %s, not recorded; %s\n", two(r->limit[k], "", a), mistake_name(r));
+    if (!one) continue;
+    const char *recorded = one->mistake[0] ? one->mistake : "no known mistake";
+    if (r->fresh) printf(", was %s; %s%s%s\n", two(one->error[k], "", a), mistake_name(r), r->same ? "" : ", was ", r->same ? "" : recorded);
+    int other = r->failed && !r->same;
+    for (k = 0; k < 2; k++) {
+      if (!r->lower[k] || !strcmp(two(one->error[k], "", a), two(r->found[k], "", b))) continue;
+      printf("better: %s, %s to %s%s", r->motion->name, a, two(r->found[k], k ? "" : " rad", b), k ? " (rates)" : "");
+      printf("%s%s: record again to tighten\n", other ? ", now " : "", other ? mistake_name(r) : "");
+      break;
+    }
+    if (r->failed && !r->fresh) one->count = 1, sum++;
+    if (recorded != one->mistake || other) strcpy(one->mistake, other ? mistake_name(r) : recorded);
   }
   for (int n = 0; n < known_count; n++) {
     const char *why = "not there";
     for (int i = 0; i < motion_count; i++) if (!strcmp(motions[i].name, known[n].name)) why = "skipped";
     if (!known[n].seen) printf("%s: was tested, is %s now: record again\n", known[n].name, why), worse++;
   }
-  printf("known errors: %d", sum);
+  summary(fresh, 1, 1, order);
+  printf("known errors of %s: %d", path, sum);
   for (int left = sum; left;) { /* the mistake of most motions first */
     int best = 0, most = 0;
     for (int n = 0; n < known_count; n++) {
       int votes = 0;
-      for (int i = 0; count[n] && i < known_count; i++) votes += count[i] && !strcmp(known[i].mistake, known[n].mistake);
+      for (int i = 0; known[n].count && i < known_count; i++) votes += known[i].count && !strcmp(known[i].mistake, known[n].mistake);
       if (votes > most) best = n, most = votes;
     }
-    printf("%s%s: %d", shown++ ? ", " : " (", known[best].mistake[0] ? known[best].mistake : "no known mistake", most);
-    for (int n = 0; n < known_count; n++) if (n != best && !strcmp(known[n].mistake, known[best].mistake)) count[n] = 0;
-    count[best] = 0, left -= most;
+    printf("%s%s: %d", shown++ ? ", " : " (", known[best].mistake, most);
+    for (int n = 0; n < known_count; n++) if (!strcmp(known[n].mistake, known[best].mistake)) known[n].count = 0;
+    left -= most;
   }
   printf("%s, new failures: %d\n", sum ? ")" : "", worse);
-  short_number(was, 2, a), short_number(is, 2, b);
-  int attitude = strcmp(a, b) != 0, orders = before >= 0 && order >= 0 && fabs(before - order) >= 0.2;
-  if (attitude || orders || first[0]) printf("free rotation at your step: ");
+  int attitude = strcmp(short_number(was, 2, a), short_number(is, 2, b)) && fabs(is - was) > 0.01 * was && fmax(was, is) < LARGEST;
+  int orders = before >= 0 && order >= 0 && fabs(before - order) >= 0.2;
+  attitude = attitude && (is > was || !worse);
+  if (attitude || orders || first) printf("free rotation at your step: ");
   if (attitude) printf("attitude error %s to %s rad", a, b);
   if (orders) printf("%sorder %.1f to %.1f", attitude ? ", " : "", before, order);
-  if (first[0]) printf("%sfirst bad motion: %s", attitude || orders ? "; " : "", first);
-  if (attitude || orders || first[0]) printf("\n");
+  if (first) printf("%sfirst bad motion: %s (%s)", attitude || orders ? "; " : "", first->motion->name, mistake_name(first));
+  if (attitude || orders || first) printf("\n");
   return worse;
 }
 
@@ -576,11 +626,15 @@ NULL};
 /* Test the motions and return the exit code: 0, 1 if a motion fails, 2 if the test is not possible. */
 static int run(int argc, char **argv) {
   const char *record = getenv("ROTATION_RECORD"), *compare = getenv("ROTATION_KNOWN");
-  char line[2048], feature[64];
+  char line[2048], feature[64], unit[32];
   int failed = 0, orders = 0, files = 0;
   double order[MOST];
   FILE *file;
   motion_count = result_count = mistake_count = 0;
+  for (const char *at = HAS; *at;) {
+    at = copy_field(feature, sizeof feature, at + strspn(at, " "), ",");
+    if (feature[0] && !has(FEATURES, feature)) return refuse("HAS: got %s; allowed: %s", feature, FEATURES), 2;
+  }
   for (int i = 1; i < argc; i++) {
     int to_record = !strcmp(argv[i], "--record");
     if (to_record || !strcmp(argv[i], "--known")) {
@@ -604,8 +658,8 @@ static int run(int argc, char **argv) {
   sprintf(now, "order %d, %g rad, %s", (int)ORDER, ANGLE, SINGLE ? "single" : "double");
   for (int i = 0; i < motion_count; i++) {
     const char *at = motions[i].features;
-    for (feature[0] = 0; *at && (!feature[0] || strstr(HAS, feature));) at = copy_field(feature, sizeof feature, at, ",");
-    if (feature[0] && !strstr(HAS, feature)) {
+    for (feature[0] = 0; *at && (!feature[0] || has(HAS, feature));) at = copy_field(feature, sizeof feature, at, ",");
+    if (feature[0] && !has(HAS, feature)) {
       printf("%s: skipped, it has %s\n", motions[i].name, feature);
       continue;
     }
@@ -616,11 +670,11 @@ static int run(int argc, char **argv) {
   }
   qsort(order, (size_t)orders, sizeof *order, compare_numbers);
   double median = orders ? order[orders / 2] : -1;
-  name_mistakes(failed, 0, median);
+  summary(failed, 0, 0, median);
   for (int i = 0; i < result_count; i++) {
     const Result *r = &results[i];
     if (r->above <= 0 && (!r->failed || compare)) continue;
-    print_error(r, r->most), printf(", tolerance %.1e", r->limit[r->most]);
+    print_error(r, r->most), printf(", tolerance %s", two(r->limit[r->most], "", unit));
     if (r->failed) printf("; %s\n", mistake_name(r));
     else printf(": %.0f %% above the tolerance, falls as h^%.1f: right\n", r->above, r->falls);
   }
@@ -629,10 +683,12 @@ static int run(int argc, char **argv) {
     return worse < 0 ? 2 : worse > 0;
   }
   printf("%d of %d motions failed\n", failed, result_count);
-  name_mistakes(failed, 1, median);
+  summary(failed, 0, 1, median);
   if (record) {
     if (!write_known(record, median)) return 2;
-    printf("%s: %d motions recorded, %d known errors\n", record, result_count, failed);
+    printf("%s: %d motions recorded, %d known errors", record, result_count, failed);
+    if (strcmp(record, "known.txt")) printf(". The next run needs --known %s (or ROTATION_KNOWN)", record);
+    printf("\n");
     return 0;
   }
   if (failed) printf("Known and accepted? --record known.txt (or ROTATION_RECORD=known.txt): then only new failures fail\n");

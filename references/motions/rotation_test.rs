@@ -7,7 +7,7 @@ use std::io::Write;
 const ORDER: u32 = 2; // the order of your integrator: 1, 2 or 4 (2 for order 3)
 const ANGLE: f64 = 0.01; // |w| h in rad; 0.03 and 0.1 with the files of all motions
 const SINGLE: bool = false; // single precision
-const HAS: &str = ""; // features of your engine: "rotor, torque, damping, fixed point, orbit"; other motions are skipped
+const HAS: &str = ""; // what `simulate` reads of `m`: "rotor, torque, damping, fixed point, orbit"; other motions are skipped
 
 type State = [f64; 7]; // quaternion, scalar first, body to world; rates in body axes, rad/s
 
@@ -59,7 +59,9 @@ struct Check {
 
 const NAMES: [&str; 4] = ["attitude", "rates", "energy", "momentum"];
 const NEAR: f64 = 0.2; // mean square of logarithms: errors over the errors of a mistake that explains them
+const LARGE: f64 = 0.08; // errors that show two mistakes
 const LARGEST: f64 = 1e6; // instead of errors that are not finite
+const FEATURES: &str = "rotor, torque, damping, fixed point, orbit";
 const HEADER: &str = "# Known errors on exact motions. A later run fails if a motion is worse or has another mistake. Written by --record.";
 
 type Known = Vec<(String, [f64; 2], String)>; // motion; attitude and rates error; mistake
@@ -173,16 +175,22 @@ fn check(m: &Motion) -> Result<Check, String> {
         }
         if falls >= ORDER as f64 - 0.5 && (ratio <= 2.0 || near.is_empty()) {
             note = format!(": {:.0} % above the tolerance, falls as h^{falls:.1}: right", 100.0 * (ratio - 1.0));
+        } else if near.is_empty() { // a large error of the attitude alone, or of the rates alone, is still there beside another mistake
+            for (name, known) in &m.catches {
+                let k = usize::from(known[0] < known[1]);
+                if known[1 - k] == 0.0 && known[k] > LARGE && (found[k].max(limit[k]) / known[k]).ln().abs() < 0.03 {
+                    near.push((name.clone(), NEAR));
+                }
+            }
         }
     }
     let (failed, name) = (ratio > 1.0 && note.is_empty(), m.name.clone());
     Ok(Check { name, free, found, limit, most, near, order, note, failed, mistake: String::new() })
 }
 
-// Name the mistake of each motion that fails; return those that explain most motions, and the motions that they leave.
-fn name_mistakes(results: &mut [Check]) -> (Vec<String>, Vec<String>) {
-    let (mut rest, mut named): (Vec<&mut Check>, _) = (results.iter_mut().filter(|r| r.failed).collect(), vec![]);
-    let failed = rest.len();
+// Name the mistake of each motion that fails, those that explain most motions first, and return lines about them.
+fn summary(failing: Vec<&mut Check>, whole: &str, measured: Option<f64>) -> Vec<String> {
+    let (failed, mut rest, mut lines) = (failing.len(), failing, vec![]);
     for r in rest.iter_mut() {
         r.mistake = r.near.iter().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(String::new(), |best| best.0.clone());
     }
@@ -198,7 +206,7 @@ fn name_mistakes(results: &mut [Check]) -> (Vec<String>, Vec<String>) {
         if 10 * n < failed {
             break;
         }
-        named.push(format!("\"{best}\" explains {n} of them"));
+        lines.push(format!("\"{best}\" explains {n} of {whole}"));
         rest.retain_mut(|r| {
             let left = r.near.iter().all(|(name, _)| *name != best);
             if !left {
@@ -207,7 +215,15 @@ fn name_mistakes(results: &mut [Check]) -> (Vec<String>, Vec<String>) {
             left
         });
     }
-    (named, rest.iter().map(|r| r.name.clone()).collect())
+    if let Some(order) = measured.filter(|order| 2 * rest.len() > failed && (0.5..ORDER as f64 - 0.5).contains(order)) {
+        lines.push(format!("this program has order {order:.1}, {ORDER} was declared"));
+    }
+    if !rest.is_empty() {
+        let names: Vec<&str> = rest.iter().take(5).map(|r| r.name.as_str()).collect();
+        lines.push(format!("{} not explained by a mistake: {}", rest.len(), names.join(", ")));
+        lines.push("What now: references/motions/my_engine_fails.md of conservative-rotation".to_string());
+    }
+    lines
 }
 
 // Return a number as 1.2e-05.
@@ -225,8 +241,17 @@ fn short(x: f64, digits: usize) -> String {
     format!("{x:.*}", (digits as i32 - 1 - x.log10().floor() as i32) as usize)
 }
 
+// Return an error in two digits of the three that are recorded, so that the same number looks the same.
+fn two(x: f64) -> String {
+    if x < LARGEST { scientific(scientific(x, 3).parse().unwrap(), 2) } else { "not finite".to_string() }
+}
+
+fn two_with_unit(x: f64, k: usize) -> String {
+    two(x) + if k == 0 && x < LARGEST { " rad" } else { "" }
+}
+
 fn error(r: &Check, k: usize) -> String {
-    format!("{}: {} error {}{}", r.name, NAMES[k], scientific(r.found[k], 2), if k == 0 { " rad" } else { "" })
+    format!("{}: {} error {}", r.name, NAMES[k], two_with_unit(r.found[k], k))
 }
 
 fn settings() -> String {
@@ -286,55 +311,64 @@ fn write_known(path: &str, results: &[Check], order: Option<f64>) -> Result<(), 
 }
 
 // Return the lines of a run with known errors, and the number of motions that are worse.
-fn compare(results: &[Check], order: Option<f64>, path: &str, skipped: &[String]) -> Result<(Vec<String>, usize), String> {
+fn compare(results: &mut [Check], order: Option<f64>, path: &str, skipped: &[String]) -> Result<(Vec<String>, usize), String> {
     let (before, known) = read_known(path)?;
-    let (mut lines, mut mistakes, mut first, mut new): (_, Vec<(&str, usize)>, _, _) = (vec![], vec![], String::new(), 0);
-    let mut largest = [0.0f64; 2]; // of free bodies, before and now
-    for r in results {
-        let (was, mistake) = (known.iter().find(|each| each.0 == r.name), or_none(&r.mistake));
-        let above = |k: usize| was.is_some_and(|was| r.found[k] > 1.005 * was.1[k] + r.limit[k]); // it has three digits
-        let same = was.is_some_and(|was| if was.2.is_empty() { r.near.is_empty() } else { r.near.iter().any(|each| each.0 == was.2) });
-        if let Some(was) = was.filter(|_| r.free) {
-            largest = [largest[0].max(was.1[0]), largest[1].max(r.found[0])];
-        }
-        if r.failed && (!same || above(0) || above(1)) {
-            lines.push(match was {
-                None => format!("{}, tolerance {}, not recorded; {mistake}", error(r, r.most), scientific(r.limit[r.most], 2)),
-                Some(was) => {
-                    let k = usize::from(above(1) && !above(0));
-                    let other = if same { String::new() } else { format!(", was {}", or_none(&was.2)) };
-                    format!("{}, was {}; {mistake}{other}", error(r, k), scientific(was.1[k], 2))
-                }
-            });
-            if first.is_empty() {
-                first = format!("{} ({mistake})", r.name);
+    let (mut lines, mut mistakes): (_, Vec<(String, usize)>) = (vec![], vec![]);
+    let find = |r: &Check| known.iter().find(|each| each.0 == r.name);
+    let is_same = |r: &Check| find(r).is_some_and(|was| if was.2.is_empty() { r.near.is_empty() } else { r.near.iter().any(|each| each.0 == was.2) });
+    let changed = |r: &Check, sign: f64| -> Vec<usize> { // errors that are larger, or smaller; recorded numbers have three digits
+        find(r).map_or(vec![], |was| (0..2).filter(|&k| sign * (r.found[k] - was.1[k]) > 0.01 * was.1[k] + r.limit[k]).collect())
+    };
+    let is_better = |r: &Check| changed(r, 1.0).is_empty() && !changed(r, -1.0).is_empty();
+    let is_new = |r: &Check| r.failed && !(is_better(r) || (is_same(r) && changed(r, 1.0).is_empty()));
+    let failing: Vec<&mut Check> = results.iter_mut().filter(|r| is_new(r)).collect();
+    let mut new = failing.len();
+    let about = summary(failing, &format!("{new} new failures"), order);
+    for r in results.iter() {
+        let mistake = or_none(&r.mistake);
+        let Some(was) = find(r) else {
+            if r.failed {
+                lines.push(format!("{}, tolerance {}, not recorded; {mistake}", error(r, r.most), two(r.limit[r.most])));
             }
-            new += 1;
+            continue;
+        };
+        if is_new(r) {
+            let k = usize::from(changed(r, 1.0) == [1]);
+            let other = if is_same(r) { String::new() } else { format!(", was {}", or_none(&was.2)) };
+            lines.push(format!("{}, was {}; {mistake}{other}", error(r, k), two(was.1[k])));
             continue;
         }
-        let Some(was) = was else { continue };
         if r.failed {
-            match mistakes.iter_mut().find(|each| each.0 == was.2) {
+            let name = if is_same(r) { or_none(&was.2) } else { mistake };
+            match mistakes.iter_mut().find(|each| each.0 == name) {
                 Some(each) => each.1 += 1,
-                None => mistakes.push((&was.2, 1)),
+                None => mistakes.push((name.to_string(), 1)),
             }
         }
-        if let Some(k) = (0..2).find(|&k| was.1[k] - r.found[k] > r.limit[k] + 0.005 * was.1[k]) {
-            let (a, b) = (scientific(was.1[k], 2), scientific(r.found[k], 2));
-            lines.push(format!("better: {}, {a} to {b}{}: record again to tighten", r.name, [" rad", " (rates)"][k]));
+        let lower = changed(r, -1.0).into_iter().find(|&k| is_better(r) && two(was.1[k]) != two(r.found[k]));
+        if let Some(k) = lower {
+            let other = if r.failed && !is_same(r) { format!(", now {mistake}") } else { String::new() };
+            let (a, b, rates) = (two(was.1[k]), two_with_unit(r.found[k], k), ["", " (rates)"][k]);
+            lines.push(format!("better: {}, {a} to {b}{rates}{other}: record again to tighten", r.name));
         }
     }
     for (name, _, _) in known.iter().filter(|each| results.iter().all(|r| r.name != each.0)) {
         lines.push(format!("{name}: was tested, is {} now: record again", if skipped.contains(name) { "skipped" } else { "not there" }));
         new += 1;
     }
+    lines.extend(about);
     mistakes.sort_by_key(|each| -(each.1 as i64));
-    let each: Vec<String> = mistakes.iter().map(|(name, n)| format!("{}: {n}", or_none(name))).collect();
+    let each: Vec<String> = mistakes.iter().map(|(name, n)| format!("{name}: {n}")).collect();
     let text = if each.is_empty() { String::new() } else { format!(" ({})", each.join(", ")) };
-    lines.push(format!("known errors: {}{text}, new failures: {new}", mistakes.iter().map(|each| each.1).sum::<usize>()));
-    let (a, b, mut parts) = (short(largest[0], 2), short(largest[1], 2), vec![]);
-    if a != b {
-        parts.push(format!("attitude error {a} to {b} rad"));
+    lines.push(format!("known errors of {path}: {}{text}, new failures: {new}", mistakes.iter().map(|each| each.1).sum::<usize>()));
+    let (mut a, mut b, mut parts) = (0.0f64, 0.0f64, vec![]);
+    for r in results.iter().filter(|r| r.free) {
+        if let Some(was) = find(r) {
+            (a, b) = (a.max(was.1[0]), b.max(r.found[0]));
+        }
+    }
+    if short(a, 2) != short(b, 2) && (b - a).abs() > 0.01 * a && a.max(b) < LARGEST && (b > a || new == 0) {
+        parts.push(format!("attitude error {} to {} rad", short(a, 2), short(b, 2)));
     }
     if let (Some(a), Some(b)) = (before, order) {
         if (a - b).abs() >= 0.2 {
@@ -342,8 +376,8 @@ fn compare(results: &[Check], order: Option<f64>, path: &str, skipped: &[String]
         }
     }
     let mut text = parts.join(", ");
-    if !first.is_empty() {
-        text += &format!("{}first bad motion: {first}", if text.is_empty() { "" } else { "; " });
+    if let Some(first) = results.iter().find(|r| is_new(r)) {
+        text += &format!("{}first bad motion: {} ({})", if text.is_empty() { "" } else { "; " }, first.name, or_none(&first.mistake));
     }
     if !text.is_empty() {
         lines.push(format!("free rotation at your step: {text}"));
@@ -353,6 +387,10 @@ fn compare(results: &[Check], order: Option<f64>, path: &str, skipped: &[String]
 
 // Test the motions and return whether they are right, or why the test is not possible.
 fn run(arguments: &[String]) -> Result<bool, String> {
+    let has: Vec<&str> = HAS.split(',').map(str::trim).filter(|part| !part.is_empty()).collect();
+    if let Some(part) = has.iter().find(|part| FEATURES.split(", ").all(|each| each != **part)) {
+        return Err(format!("HAS: got {part}; allowed: {FEATURES}"));
+    }
     let asked = |name: &str| std::env::var(name).ok().filter(|path| !path.is_empty());
     let (mut record, mut known) = (asked("ROTATION_RECORD"), asked("ROTATION_KNOWN"));
     let (mut motions, mut values) = (vec![], arguments.iter());
@@ -389,7 +427,7 @@ fn run(arguments: &[String]) -> Result<bool, String> {
     let mut say = |text: &str| writeln!(out, "{text}").unwrap();
     let (mut results, mut skipped) = (vec![], vec![]);
     for m in &motions {
-        match m.features.iter().find(|part| HAS.split(", ").all(|each| each != part.as_str())) {
+        match m.features.iter().find(|part| !has.contains(&part.as_str())) {
             Some(part) => {
                 say(&format!("{}: skipped, it has {part}", m.name));
                 skipped.push(m.name.clone());
@@ -400,28 +438,25 @@ fn run(arguments: &[String]) -> Result<bool, String> {
     let mut orders: Vec<f64> = results.iter().filter_map(|r| r.order).collect();
     orders.sort_by(f64::total_cmp);
     let order = orders.get(orders.len() / 2).copied();
-    let failed = results.iter().filter(|r| r.failed).count();
-    let (named, rest) = name_mistakes(&mut results);
+    let failing: Vec<&mut Check> = results.iter_mut().filter(|r| r.failed).collect();
+    let failed = failing.len();
+    let about = summary(failing, "them", order);
     for r in results.iter().filter(|r| !r.note.is_empty() || (r.failed && known.is_none())) {
         let text = if r.failed { format!("; {}", or_none(&r.mistake)) } else { r.note.clone() };
-        say(&format!("{}, tolerance {}{text}", error(r, r.most), scientific(r.limit[r.most], 2)));
+        say(&format!("{}, tolerance {}{text}", error(r, r.most), two(r.limit[r.most])));
     }
     if let Some(path) = known {
-        let (lines, new) = compare(&results, order, &path, &skipped)?;
+        let (lines, new) = compare(&mut results, order, &path, &skipped)?;
         lines.iter().for_each(|line| say(line));
         return Ok(new == 0);
     }
     say(&format!("{failed} of {} motions failed", results.len()));
-    named.iter().for_each(|line| say(line));
-    if let Some(order) = order.filter(|order| 2 * rest.len() > failed && (0.5..ORDER as f64 - 0.5).contains(order)) {
-        say(&format!("this program has order {order:.1}, {ORDER} was declared"));
-    }
-    if !rest.is_empty() {
-        say(&format!("{} not explained by a mistake: {}", rest.len(), rest[..rest.len().min(5)].join(", ")));
-    }
+    about.iter().for_each(|line| say(line));
     if let Some(path) = record {
         write_known(&path, &results, order)?;
-        say(&format!("{path}: {} motions recorded, {failed} known errors", results.len()));
+        let used = std::fs::canonicalize("known.txt").ok() == std::fs::canonicalize(&path).ok();
+        let hint = if used { String::new() } else { format!(". The next run needs --known {path} (or ROTATION_KNOWN)") };
+        say(&format!("{path}: {} motions recorded, {failed} known errors{hint}", results.len()));
         return Ok(true);
     }
     if failed > 0 {

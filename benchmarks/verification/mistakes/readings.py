@@ -103,7 +103,7 @@ READINGS = (
         _rolled(-1),
         ATTITUDES,
         quaternions=True,
-        remedy="write the scalar first",
+        remedy="your engine returns xyzw: reorder, and write the scalar first",
         option="--quaternion xyzw, or name the columns",
     ),
     Reading(
@@ -113,7 +113,7 @@ READINGS = (
         _rolled(1),
         ATTITUDES,
         quaternions=True,
-        remedy="write the scalar last",
+        remedy="your engine returns wxyz: reorder, and write the scalar last",
         option="--quaternion wxyz, or name the columns",
     ),
     Reading(

@@ -255,14 +255,14 @@ SCENES = (
         "The initial quaternion is read as x, y, z, w",
         partial(_start, change=lambda R, w: (from_quaternion(np.roll(to_quaternion(R), 1)), w)),
         start=True,
-        remedy="the scalar of `q0` comes first",
+        remedy="your engine reads xyzw: reorder `q0`, whose scalar comes first",
     ),
     SceneMistake(
         "start in order wxyz",
         "The initial quaternion is read as w, x, y, z, but its scalar is last",
         partial(_start, change=lambda R, w: (from_quaternion(np.roll(to_quaternion(R), -1)), w)),
         start=True,
-        remedy="the scalar comes last",
+        remedy="your engine reads wxyz: reorder `q0`, whose scalar comes last here",
     ),
     SceneMistake(
         "start transposed",

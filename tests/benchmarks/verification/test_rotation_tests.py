@@ -39,7 +39,11 @@ def summary(lines):
     return (
         int(lines[at].partition(" ")[0]),
         {each[1]: int(each[2]) for each in explained if each},
-        [line for line, each in zip(lines[at + 1 :], explained, strict=True) if not each and "--record" not in line],
+        [
+            line
+            for line, each in zip(lines[at + 1 :], explained, strict=True)
+            if not each and not line.startswith(("Known and accepted", "What now"))
+        ],
     )
 
 
@@ -80,7 +84,7 @@ def test_small_set_of_other_motions():
     assert len(one_file.small_set([*FILES.values()], number=1)) == 10  # as many as all mistakes and bands need
 
 
-SIZES = {"c": 37_000, "csharp": 34_000, "javascript": 30_000, "python": 30_500, "rust": 36_500}
+SIZES = {"c": 40_000, "csharp": 35_500, "javascript": 31_500, "python": 32_000, "rust": 38_000}
 """Largest sizes of the files, in bytes, of which the motions have 14,000."""
 
 
@@ -205,6 +209,14 @@ def test_planted_mistakes_are_named_by_the_summary(language, mistake, embedded, 
     first = next(iter(explained))
     assert ALIKE.get(first, first) == ALIKE.get(mistake, mistake)
     assert explained[first] >= 0.65 * failing > 0
+
+
+@pytest.mark.parametrize("language", sampled(EVERY, leave=["Python"]))
+def test_a_large_mistake_is_named_beside_another_one(language, tmp_path):
+    """Measured: 7 of 8 motions of free bodies, in which no signature explains both. The other mistake shows in the next run."""
+    failing, explained, _ = summary(run(language, tmp_path, RK2, "order xyzw, damping 0.05", embedded=True))
+    assert next(iter(explained)) == "order xyzw"
+    assert explained["order xyzw"] >= 0.65 * failing
 
 
 NOT_TOLD_APART = {"no products of inertia": "diagonal gyroscopic term"}

@@ -45,6 +45,10 @@ CASES = {
     "order": ([(row(observed_order=1.0), row(observed_order=2.0))], "order 1.0 to 2.0"),
     "order by less than 0.2": ([(row(observed_order=1.0), row(observed_order=1.19))], ""),
     "a drift": ([(row(), row(energy_drift_max=0.1))], "first bad motion: brick_flip (no known mistake)"),
+    "a smaller error beside a new failure": (
+        [(row(), row(attitude_error_max=1e-5, energy_drift_max=0.1))],
+        "first bad motion: brick_flip (no known mistake)",
+    ),
     "work is no motion": ([(row(), row(steps=601.0))], ""),
     "a mistake of both versions": ([(wrong("damping"), wrong("damping"))], ""),
     "another mistake": ([(wrong("damping"), wrong("late"))], "first bad motion: brick_flip (late)"),

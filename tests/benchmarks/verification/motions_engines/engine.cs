@@ -96,7 +96,7 @@
       if (MISTAKE == "world rates") w = Apply(Matrix(q), w);
       if (MISTAKE == "reversed rates") w = Scaled(w, -1);
       if (MISTAKE == "transposed") q = new[] {q[0], -q[1], -q[2], -q[3]};
-      if (MISTAKE == "order xyzw") q = new[] {q[1], q[2], q[3], q[0]};
+      if (MISTAKE.Contains("order xyzw")) q = new[] {q[1], q[2], q[3], q[0]};
       states.Add(q.Concat(w).ToArray());
     }
     return states.ToArray();

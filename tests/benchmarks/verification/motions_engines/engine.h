@@ -143,7 +143,7 @@ static void simulate(const Motion *m, double h, int steps, int samples, double s
       if (IS("transposed")) state[i][1 + n] *= -1;
       if (IS("reversed rates")) state[i][4 + n] *= -1;
       if (IS("world rates")) state[i][4 + n] = (double)v[n];
-      if (IS("order xyzw")) state[i][n] = (double)y[n + 1], state[i][3] = (double)y[0];
+      if (strstr(MISTAKE, "order xyzw")) state[i][n] = (double)y[n + 1], state[i][3] = (double)y[0];
     }
   }
 }

@@ -75,7 +75,7 @@ function simulate(m, h, steps, samples) {
     if (MISTAKE === "world rates") w = apply(matrix(q), w);
     if (MISTAKE === "reversed rates") w = scaled(w, -1);
     if (MISTAKE === "transposed") q = [q[0], -q[1], -q[2], -q[3]];
-    if (MISTAKE === "order xyzw") q = [...q.slice(1), q[0]];
+    if (MISTAKE.includes("order xyzw")) q = [...q.slice(1), q[0]];
     states.push([q, w]);
   }
   return states;

@@ -119,7 +119,7 @@ def simulate(m, h, steps, samples):
         q, w = y[:4], y[4:]
         if MISTAKE == "transposed":
             q = [q[0], -q[1], -q[2], -q[3]]
-        if MISTAKE == "order xyzw":
+        if "order xyzw" in MISTAKE:
             q = [*q[1:], q[0]]
         w = {"reversed rates": [-x for x in w], "world rates": apply(matrix(y[:4]), w)}.get(MISTAKE, w)
         states.append((q, w))

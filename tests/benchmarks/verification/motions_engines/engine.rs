@@ -115,7 +115,7 @@ fn simulate(m: &Motion, h: f64, steps: usize, samples: usize) -> Vec<State> {
             if is("transposed") { state[1 + n] *= -1.0; }
             if is("reversed rates") { state[4 + n] *= -1.0; }
             if is("world rates") { state[4 + n] = v[n] as f64; }
-            if is("order xyzw") { state[n] = y[n + 1] as f64; state[3] = y[0] as f64; }
+            if mistake().contains("order xyzw") { state[n] = y[n + 1] as f64; state[3] = y[0] as f64; }
         }
         states.push(state);
     }

@@ -43,6 +43,8 @@ class Engine:
     rounds: bool = False
     """Single precision that is not declared."""
     has: str = ALL
+    code: str = ""
+    """The function `simulate`, instead of a method."""
 
 
 def missing(language):
@@ -59,7 +61,7 @@ def write(language, folder, engine):
         engine.single or engine.rounds,
     )
     text = (MOTIONS / name).read_text()
-    text = MARK.sub(lambda _: code, text, count=1) if engine.method else text
+    text = MARK.sub(lambda _: engine.code or code, text, count=1) if engine.method or engine.code else text
     yes = {"C": "1", "C++": "1", "Python": "True"}.get(language, "true")
     for pattern, new in (
         (r"\bORDER(: u32)? = 2\b", rf"ORDER\1 = {engine.order}"),
