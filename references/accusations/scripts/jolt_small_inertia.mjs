@@ -1,4 +1,4 @@
-// Without a message, an inertia whose norm is below 1e-6 kg m^2 is replaced by another one (a sphere's).
+// An inertia whose norm is below 1e-6 kg m^2 is replaced by another one.
 import start from 'jolt-physics';
 const J = await start(), pairs = new J.ObjectLayerPairFilterTable(1), phases = new J.BroadPhaseLayerInterfaceTable(1, 1);
 phases.MapObjectToBroadPhaseLayer(0, new J.BroadPhaseLayer(0));
