@@ -15,6 +15,7 @@ FOLDER = ROOT / "references" / "accusations"
 PAGES = {
     "bodies": ROOT / "references" / "model_files" / "measured.md",
     "motions": ROOT / "benchmarks" / "verification" / "pairs" / "measured.md",
+    "engines": ROOT / "references" / "README.md",
 }
 """The page of each group of sentences."""
 
@@ -54,7 +55,11 @@ def counted() -> str:
     run = {result.script for result in results}
     scripts = sum(row.script in run for row in rows)
     versions = len({(row.engine, result.version) for row in rows for result in results if result.script == row.script})
-    return f"{scripts} of {len(rows)} sentences about engines have a script, which was run in {versions} versions of engines.\n"
+    link = _link(PAGES["bodies"].parent, "accusations.csv", FOLDER / "accusations.csv")
+    return (
+        f"{scripts} of {len(rows)} sentences about engines have a script; {versions} versions of engines were run.\n"
+        f"{link} also has the sentences without a script.\n"
+    )
 
 
 TABLES: dict[str, Callable[[], str]] = {

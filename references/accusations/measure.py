@@ -20,7 +20,7 @@ from .rows import VERDICTS, Accusation, Result, read_accusations
 
 LOCAL = {"mujoco": "mujoco", "pinocchio": "pin", "usd-core": "usd-core"}
 """Engines that extras of this package install into this interpreter, and their packages."""
-LIMIT = 300.0
+LIMIT = 600.0
 """Time limit of a script, s. Newton compiles for minutes when it runs for the first time."""
 MEMORY = 4
 """Gigabytes of memory of a script, on Linux."""

@@ -1,8 +1,8 @@
 """Sentences about engines, and what their scripts printed.
 
 `accusations.csv` has a row for each sentence: the page that shows it, the engine, the script in `scripts/`, and the file that
-the script gets, relative to `references`. The sentence is the first line of the script. Rows without a script have their
-sentence in the table; no page shows them. `measured.csv` has a row for each script and version of the engine.
+the script gets, relative to `references`. The sentence is the first line of the script. A row without a script has a sentence
+that waits for one, and is in no generated part of a page. `measured.csv` has a row for each script and version of the engine.
 """
 
 from __future__ import annotations
