@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -22,8 +23,6 @@ LOCAL = {"mujoco": "mujoco", "pinocchio": "pin", "usd-core": "usd-core"}
 """Engines that extras of this package install into this interpreter, and their packages."""
 LIMIT = 600.0
 """Time limit of a script, s. Newton compiles for minutes when it runs for the first time."""
-MEMORY = 4
-"""Gigabytes of memory of a script, on Linux."""
 
 
 @dataclass(frozen=True)
@@ -58,11 +57,11 @@ class Interpreter:
 def find_interpreters(engine: str) -> list[Interpreter]:
     """Return an interpreter for each installed version of an engine, older versions first."""
     environments = {each.version: Interpreter(engine, each.version, each) for each in list_environments(engine)}
-    try:
-        here = metadata.version(LOCAL.get(engine, ""))
-    except (metadata.PackageNotFoundError, ValueError):
-        return list(environments.values())
-    found = {**environments, here: Interpreter(engine, here)}
+    found = dict(environments)
+    if engine in LOCAL:
+        with suppress(metadata.PackageNotFoundError):
+            here = metadata.version(LOCAL[engine])
+            found[here] = Interpreter(engine, here)
     return [found[version] for version in sorted(found, key=version_key)]
 
 
@@ -106,7 +105,7 @@ def measure(engines: set[str] | None = None) -> Iterator[Result]:
     """Yield the result of each script in each installed version of its engine, by default of all engines."""
     today = datetime.date.today().isoformat()
     for accusation in read_accusations():
-        if accusation.script and engines in (None, engines and engines | {accusation.engine}):
+        if accusation.script and (engines is None or accusation.engine in engines):
             for interpreter in find_interpreters(accusation.engine):
                 verdict, printed = interpreter.run(accusation.path, accusation.file_path)
                 yield Result(accusation.script, interpreter.version, verdict, printed, today)
