@@ -17,6 +17,7 @@ import csv
 import sys
 from pathlib import Path
 
+import accused
 import counted
 import declared
 import measured
@@ -33,7 +34,7 @@ def commands() -> str:
     return "\n" + "".join(f"    {command} --out ../measured/{name}\n" for name, command in rows.COMMANDS.items()) + "\n"
 
 
-PARTS = {**measured.TABLES, **declared.TABLES, **counted.TABLES, "commands that measure": commands}
+PARTS = {**measured.TABLES, **declared.TABLES, **counted.TABLES, **accused.TABLES, "commands that measure": commands}
 
 
 def read_pages(root: Path) -> dict[Path, str]:

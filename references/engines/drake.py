@@ -4,8 +4,8 @@ A free body is on Drake's quaternion floating joint. A body about a fixed point 
 whose coordinates are roll, pitch and yaw: errors grow when the first principal axis comes near the vertical, and a run in which
 it reaches the vertical ends there. A fixed spring with a rest length is a `LinearSpringDamper`. Other fields, except gravity,
 are a `LeafSystem` in Python, which Drake calls in each evaluation. Switched off: error control (`set_fixed_step_mode`), unless
-an accuracy is given or the integrator is "default". After a fixed step of "cenic", `EvalBodyPoseInWorld` returns the pose
-before the step, so the cache is invalidated first.
+an accuracy is given or the integrator is "default". After a fixed step of "cenic", the cache is invalidated: here, and not in a
+script of Drake alone, `EvalBodyPoseInWorld` returned the pose before the step.
 
 Parameters
 ----------
@@ -84,7 +84,7 @@ def prepare(given):
             for sample, time in enumerate(times.tolist()):
                 if sample:  # AdvanceTo(0) would update a discrete plant
                     simulator.AdvanceTo(time)
-                if given.integrator == "cenic":  # in fixed steps it leaves the pose of the step before in the cache
+                if given.integrator == "cenic":  # see above
                     context.get_mutable_continuous_state()
                 pose, velocity = plant.EvalBodyPoseInWorld(inner, body), plant.EvalBodySpatialVelocityInWorld(inner, body)
                 R[sample], w[sample], p[sample] = pose.rotation().matrix(), velocity.rotational(), pose.translation()

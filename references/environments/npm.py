@@ -42,7 +42,7 @@ class Npm(EnvironmentKind):
             return Lock(version or versions[0], (folder / self.lock_file).read_text(encoding="utf-8"))
 
     def fill(self, folder: Path, lock: Lock, source: Source) -> tuple[str, tuple[str, ...]]:
-        ask = [_find("node"), "-p", "process.versions.node"]
+        ask = [find_program("node"), "-p", "process.versions.node"]
         node = subprocess.run(ask, capture_output=True, text=True, check=True, timeout=60).stdout.strip()
         if version_key(node) < version_key("20"):
             raise BadInput("engine", f"an engine in JavaScript, but Node {node}", NODE)
@@ -62,10 +62,10 @@ class Npm(EnvironmentKind):
         return sorted(releases, key=version_key, reverse=True)
 
     def command(self, folder: Path) -> tuple[str | Path, ...]:
-        return _find("node"), Path(program.__file__).with_suffix(self.suffix), folder
+        return find_program("node"), Path(program.__file__).with_suffix(self.suffix), folder
 
 
-def _find(name: str) -> str:
+def find_program(name: str) -> str:
     """Return the path of `node` or `npm`. Raise `BadInput` if it is not installed."""
     if path := shutil.which(name):
         return path
@@ -76,7 +76,7 @@ def _run_npm(folder: Path, *arguments: str) -> Any:
     """Return the output of a command of npm, which is JSON. Raise `BadInput` if it fails."""
     options = ("--json", "--ignore-scripts", "--no-audit", "--no-fund", "--no-update-notifier")
     variables = {"npm_config_cache": str(folder_of_all().parent / "npm"), **os.environ}
-    command = [_find("npm"), *arguments, *options]
+    command = [find_program("npm"), *arguments, *options]
     done = subprocess.run(command, cwd=folder, env=variables, capture_output=True, text=True, check=False)
     if done.returncode == 0:
         return json.loads(done.stdout)

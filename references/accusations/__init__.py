@@ -1,0 +1,1 @@
+"""What is wrong in engines: a script of the engine alone for each sentence, and what it printed for each version."""

@@ -1,0 +1,20 @@
+// There is no gyroscopic motion: without a torque, the angular velocity of a body with three different moments stays.
+import { readFileSync } from 'fs';
+import { fileURLToPath } from 'url';
+import start from '@babylonjs/havok';
+const place = fileURLToPath(import.meta.resolve('@babylonjs/havok')).replace(/[^/]*$/, '');
+const H = await start({ wasmBinary: readFileSync(`${place}HavokPhysics.wasm`) });
+const world = H.HP_World_Create()[1], body = H.HP_Body_Create()[1];
+H.HP_World_SetGravity(world, [0, 0, 0]);
+H.HP_Body_SetShape(body, H.HP_Shape_CreateSphere([0, 0, 0], 0.05)[1]);
+H.HP_Body_SetMotionType(body, H.MotionType.DYNAMIC);
+H.HP_Body_SetMassProperties(body, [[0, 0, 0], 1, [13, 5, 10], [0, 0, 0, 1]]);
+H.HP_Body_SetLinearDamping(body, 0);
+H.HP_Body_SetAngularDamping(body, 0);
+H.HP_World_AddBody(world, body, false);
+H.HP_Body_SetAngularVelocity(body, [1, 2, 3]);
+for (let i = 0; i < 100; i++) H.HP_World_Step(world, 0.01);
+const w = H.HP_Body_GetAngularVelocity(body)[1];
+const change = Math.max(...w.map((rate, i) => Math.abs(rate - [1, 2, 3][i])));
+const text = w.map((rate) => rate.toFixed(4)).join(', ');
+console.log(`moments 13, 5 and 10: after 1 s the rates 1, 2, 3 rad/s are ${text}: ${change < 1e-4 ? 'wrong' : 'right'}`);

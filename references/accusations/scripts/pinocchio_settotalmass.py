@@ -1,0 +1,8 @@
+"""MJCF: `settotalmass` is ignored."""
+
+import sys
+
+import pinocchio as pin
+
+mass = pin.buildModelFromMJCF(sys.argv[1]).inertias[1].mass
+print(f"the mass is {mass:.4g} kg, in the file 2.3 kg:", "wrong" if abs(mass - 2.3) > 1e-6 else "right")
