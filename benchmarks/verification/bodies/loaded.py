@@ -87,7 +87,7 @@ class LoadedBody:
     """The details of a finding: a body by the readers of its file, the reference reader first, and in an engine.
 
     A reading is a dictionary of mass, kg, centre of mass, m, and inertia, kg m^2, or why a reader has none. `flaw` says why no
-    body can be like the body of the file.
+    body can be like the body of the file. `engine` is its name without a version.
     """
 
     subject: str
@@ -95,6 +95,7 @@ class LoadedBody:
     readings: dict[str, Any]
     flaw: str = ""
     seen: dict[str, Any] | None = None
+    engine: str = ""
 
 
 def verify_files(
@@ -182,7 +183,7 @@ def weigh_votes(model: Model, pairs: Sequence[tuple[Finding, LoadedBody]]) -> li
         return finding.verdict is Verdict.WRONG and not (explained or model.flaw)
 
     against = [(finding, _piece(body.seen)) for finding, body in pairs if body.seen and unexplained(finding)]
-    kinds = {finding.subject: family(finding.subject.split()[0], model.kind) for finding, _ in against}
+    kinds = {finding.subject: family(body.engine, model.kind) for finding, body in pairs}
     votes: dict[str, list[str]] = {finding.subject: [] for finding, _ in against}
     for finding, seen in against:
         for other, its in against:
@@ -322,7 +323,7 @@ class Program:
             opinion.causes,
             opinion.detail,
         )
-        return finding, LoadedBody(self.label, model.label, model.readings(), model.flaw, seen)
+        return finding, LoadedBody(self.label, model.label, model.readings(), model.flaw, seen, self.engine)
 
     def _verify(self, model: Model) -> tuple[Loaded, Opinion]:
         """Return the answer of the engine and the verdict. After a wrong one, a copy that has nothing but the mass is tried.

@@ -224,7 +224,7 @@ def made_findings(model, **seen):
         opinion = loaded.decide_body(model, name, part, 1e-4)
         finding = Finding(f"{name} 1", "bodies", model.label, opinion.verdict, allowed=1e-4, causes=opinion.causes)
         body = {key: np.asarray(value).tolist() for key, value in vars(part).items()}
-        pairs.append((finding, loaded.LoadedBody(finding.subject, model.label, {}, model.flaw, body)))
+        pairs.append((finding, loaded.LoadedBody(finding.subject, model.label, {}, model.flaw, body, name)))
     return [finding for finding, _ in loaded.weigh_votes(model, pairs)]
 
 
