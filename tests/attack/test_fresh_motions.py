@@ -1,6 +1,6 @@
 """No right program fails on fresh motions, and each mistake is caught somewhere in each seed.
 
-`pytest` runs a seed, `pytest --all` some, and `pytest --attack` the 1,000 of the page. By hand:
+`pytest` runs a seed, `pytest --all` some, and `pytest --attack` 1,000. By hand:
 
     python -m tests.attack.fresh_motions results.jsonl 20000 21000 --page
 """
