@@ -176,8 +176,8 @@ def verify(
     files of this package, each of which tests one rule of a format.
 
     The exit code is 0 if all subjects are right, 1 if one is wrong, and 3 if one is undecided or not tested. With --known, it
-    is 1 only if an error is larger than in the file, has another mistake, or is new. If a motion changed, the last line is a
-    sentence for a pull request.
+    is 1 only if an error is larger than in the file, has another mistake without being smaller, or is new. If a motion changed,
+    the last line is a sentence for a pull request.
     """
     if picture is not None:
         require_extra("conservative verify --picture", "report")

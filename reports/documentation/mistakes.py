@@ -27,7 +27,14 @@ from conservative.benchmarks.verification.explanation import Trial
 from conservative.benchmarks.verification.find_steps import by_step
 from conservative.benchmarks.verification.mistakes import BY_KEY
 from conservative.benchmarks.verification.mistakes.attitudes import Drift, Rule
-from conservative.benchmarks.verification.mistakes.bodies import FITTED, LOADED, BodyMistake, FittedBodyMistake
+from conservative.benchmarks.verification.mistakes.bodies import (
+    FILES,
+    FITTED,
+    LOADED,
+    BodyMistake,
+    FileMistake,
+    FittedBodyMistake,
+)
 from conservative.benchmarks.verification.mistakes.equations import EquationsMistake
 from conservative.benchmarks.verification.mistakes.habits import Habit, RowHabit, Standstill
 from conservative.benchmarks.verification.mistakes.mistake import Mistake
@@ -36,6 +43,7 @@ from conservative.benchmarks.verification.mistakes.samples import RESAMPLED, Res
 from conservative.benchmarks.verification.mistakes.scenes import SceneDigits, SceneMistake
 from conservative.benchmarks.verification.mistakes.steps import Integrator
 from conservative.benchmarks.verification.mistakes.times import RowTimes, Time
+from conservative.benchmarks.verification.mistakes.wrapped import KEPT, SAVED, RoundedMistake
 from conservative.benchmarks.verification.motions import files
 from conservative.benchmarks.verification.motions.motion import load
 from conservative.benchmarks.verification.recordings.table import Recording
@@ -63,9 +71,12 @@ UNSEEN = {
     "steps": "an error of the method, which the order shows",
 }
 """Kinds of mistakes that a program does not have, with the reason."""
-LOADERS = {mistake.key for mistake in (*LOADED, *FITTED)}
-"""Keys of mistakes of loaders of model files, which are named there (tests/benchmarks/verification/test_bodies.py)."""
-OF_LOADERS, NO_MOTION = "only a loader has it", "a model file has no motion"
+LOADERS = {mistake.key for mistake in (*LOADED, *FITTED, *FILES)}
+"""Keys of mistakes of model files and of their loaders, which are named there (test_bodies.py and test_links.py)."""
+WRAPPED = {mistake.key for mistake in (*SAVED, *KEPT)}
+"""Keys of mistakes of engines that save, set or scale a body, which pairs name (test_pairs.py)."""
+OF_LOADERS, OF_FILES, NO_MOTION = "only a loader has it", "only a model file has it", "a model file has no motion"
+OF_PAIRS = "named in pairs of files"
 """Reasons why a mistake cannot be seen in a motion, and in a model file."""
 NO_CLOCK = "a program has no clock: its samples are after steps"
 """Reason why a program does not have a mistake of time stamps."""
@@ -297,13 +308,15 @@ def planted(key: str) -> tuple[Scene, Rows] | None:
 
 def is_of_loaders(key: str) -> bool:
     """Return whether only loaders of model files have a mistake. Dropped products of inertia are also a mistake of a motion."""
-    return isinstance(BY_KEY[key], BodyMistake | FittedBodyMistake)
+    return isinstance(BY_KEY[key], BodyMistake | FittedBodyMistake | RoundedMistake)
 
 
 def in_recording(key: str, attitudes: bool = True) -> str:
     """Return in words how the verification of a recording with rates names a planted mistake, or why it does not."""
     if is_of_loaders(key):
         return OF_LOADERS
+    if isinstance(BY_KEY[key], FileMistake):
+        return OF_FILES
     if (example := planted(key)) is None:
         return NOT_NAMED
     scene, (R, w) = example
@@ -329,6 +342,8 @@ def not_of_programs(mistake: Mistake) -> str:
     """Return why a program does not have a mistake; "" if it can."""
     if is_of_loaders(mistake.key):
         return OF_LOADERS
+    if isinstance(mistake, FileMistake):
+        return OF_FILES
     if mistake.kind not in PROGRAM_KINDS:
         return UNSEEN[mistake.kind]
     if isinstance(mistake, Drift) or (isinstance(mistake, Standstill) and mistake.of is not None):
@@ -378,7 +393,9 @@ def _caught() -> frozenset[str]:
 def row_of(key: str) -> dict[str, str]:
     """Return the row of a mistake: its key, and the answer of each door."""
     motions = in_recording(key), in_recording(key, attitudes=False), in_program(key), in_test_files(key)
-    return dict(zip(COLUMNS, [key, *motions, NAMED if key in LOADERS else NO_MOTION], strict=True))
+    return dict(
+        zip(COLUMNS, [key, *motions, NAMED if key in LOADERS else OF_PAIRS if key in WRAPPED else NO_MOTION], strict=True)
+    )
 
 
 def read_rows() -> dict[str, dict[str, str]]:

@@ -50,5 +50,6 @@ def test_no_other_rule_decides(monkeypatch):
     for module in (compare, times, changes):
         monkeypatch.setattr(module, "direction", lambda *values, **options: 0)
     assert decide(worse).violations == ()
-    assert changes.find_changes(GOOD, replace(BAD, drifts=GOOD.drifts), TIMES, slow) == ()
-    assert changes.find_changes(GOOD, BAD, TIMES, slow) == ()
+    # An attitude that becomes lost is reported whatever its interval.
+    assert [change.lost for change in changes.find_changes(GOOD, replace(BAD, drifts=GOOD.drifts), TIMES, slow)] == [True]
+    assert [change.lost for change in changes.find_changes(GOOD, BAD, TIMES, slow)] == [True]

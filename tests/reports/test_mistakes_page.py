@@ -10,7 +10,7 @@ from conservative.reports.documentation import mistakes
 ROWS = mistakes.read_rows()
 REASONS = {
     *mistakes.UNSEEN.values(), mistakes.OF_LOADERS, mistakes.NO_MOTION, mistakes.NO_CLOCK, mistakes.OF_RECORDERS,
-    mistakes.ALL_DIGITS, "it does not change the rates",
+    mistakes.ALL_DIGITS, mistakes.OF_FILES, mistakes.OF_PAIRS, "it does not change the rates",
     "no exact motion shows it", "rates of a body in a field do not determine its motion",
 }  # fmt: skip
 QUICK = ("transposed",)
