@@ -1,4 +1,4 @@
-"""What is wrong in engines, from the rows of references/accusations: a line for each sentence whose script was run."""
+"""Tables of wrong results of engines, from references/accusations: a line for each sentence with a script that ran."""
 
 from __future__ import annotations
 

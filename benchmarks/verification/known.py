@@ -63,7 +63,7 @@ class Case:
 
 @dataclass
 class Block:
-    """What a file contains about a subject: its settings, measured order, and cases by check and name."""
+    """The record of a subject: its settings, measured order, and cases by check and name."""
 
     subject: str
     line: int = 0

@@ -53,7 +53,7 @@ TWINS = (0.1, 0.25)
 TURNED = 0.1
 """Relative difference of the inertias of twins with the same moments that shows a wrong sign of a product."""
 MATERIALS = "materials"
-"""What allows a density."""
+"""The reason for a largest density."""
 GRAVITY = 9.81
 """Acceleration of gravity, m/s^2."""
 
@@ -267,7 +267,7 @@ def _accelerations(inertia: Array, expected: Array) -> tuple[float, float]:
 
 
 def _effect(link: RobotLink, body: Body, fault: Fault) -> str:
-    """Return what a fault does to the motion of the body of a link, in words."""
+    """Return a sentence on the effect of a fault on the motion of the body of a link."""
     effect = _motion(link, body, fault)
     if part_of(link).flaw and link.link.inertia.any() and link is not body.root:
         return "; ".join(filter(None, [effect or "it hardly changes the motion", "engines that check it refuse the file"]))

@@ -1,4 +1,4 @@
-"""What the shapes of a link say about its inertia: the convex hull with uniform density, and bounds for any distribution."""
+"""Bounds of the inertia of a link from its shapes: the convex hull with uniform density, and bounds for any distribution."""
 
 from __future__ import annotations
 

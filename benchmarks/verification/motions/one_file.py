@@ -46,7 +46,7 @@ _AROUND = {
     "python": ('MOTIONS = """', "{}", '"""'),
     "rust": ('const MOTIONS: &str = "', "{}", '";'),
 }
-"""What begins the text, a line of it, and what ends it."""
+"""The beginning of the embedded text, a line of it, and its end, by language."""
 
 
 def small_set(descriptions: Sequence[Description], number: int = 12) -> list[Description]:

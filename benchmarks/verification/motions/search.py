@@ -1,7 +1,7 @@
 """The search for motions: bodies and starts of each family are drawn from a seed, and those are taken that show its mistakes.
 
-A seed gives fresh motions, one of each family, with other bodies and starts than the published ones, so that nobody tunes to
-these. The motions of `catalogue.toml` were drawn by the same functions: 40 of each family and length, from one generator.
+A seed gives fresh motions, one of each family, with other bodies and starts than the published ones, to which a program could
+be tuned. The motions of `catalogue.toml` were drawn by the same functions: 40 of each family and length, from one generator.
 
 A seed gives the same motions on every machine. Numbers of a motion have at most four digits, and the solution is computed in
 integers. Only a choice or a tolerance that round-off decides could differ.
@@ -278,7 +278,7 @@ FAMILIES: dict[str, tuple[str, tuple[str, ...], dict[str, Any]]] = {
         {"orbit": 0.7, "size": 100.0, "speed": 1.5e-3, "body": "flat"},
     ),
 }
-"""What each family is, the mistakes that it should show, and the arguments of `Random.motion`."""
+"""Families: a description, the mistakes that each should show, and the arguments of `Random.motion`."""
 LONGER: dict[str, int] = {
     **dict.fromkeys(("half_turn", "half_turn_slow", "products_flat", "huge", "fast_turn", "rotor_slow", "tiny_turned"), 2),
     **dict.fromkeys(("world_tensor", "nearly_oblate", "flat", "rod", "slow_turn", "torque_in_body", "damped"), 3),

@@ -54,7 +54,7 @@ def names() -> dict[str, str]:
 
 
 def remedies() -> dict[str, str]:
-    """Return what the author of a program changes, by the names in the files."""
+    """Return the change that mends each mistake of a program, by the names in the files."""
     changes = {name: mistake.remedy for name, mistake, _ in _all()}
     return changes | {_BOTH: f"{changes[BOTH[0]]}; {changes[f'{BOTH[1]} {BOTH[2]:g}']}"}
 

@@ -44,7 +44,7 @@ THEN = {
     ),
     ("pybullet", "mass"): "p.changeDynamics(body, $part, mass=$mass)\n",
 }
-"""What an engine does with the file that it has loaded, by engine and variant."""
+"""The ways in which an engine saves, sets or scales a loaded file, by engine and variant."""
 
 
 def script_of(method: Method, pair: Pair, first: Description, scale: float | None) -> str:
