@@ -8,9 +8,31 @@ For example:
         print(verification.sentence)
         for finding in verification.findings:
             print(finding.case, finding.verdict, finding.error, finding.allowed, finding.mistake)
+
+Tests of convergence, of any solver:
+
+    cv.verification.assert_order([0.1, 0.05, 0.025, 0.0125], errors, order=4)
 """
 
+from ..measures.convergence_order import Order, observed_order
 from .finding import CHECKS, Cause, Finding, Standing, Verdict, Verification
+from .order import OrderNotShown, OrderVerdict, assert_order, judge_order
 from .verify import Kind, kind_of, verify
 
-__all__ = ["CHECKS", "Cause", "Finding", "Kind", "Standing", "Verdict", "Verification", "kind_of", "verify"]
+__all__ = [
+    "CHECKS",
+    "Cause",
+    "Finding",
+    "Kind",
+    "Order",
+    "OrderNotShown",
+    "OrderVerdict",
+    "Standing",
+    "Verdict",
+    "Verification",
+    "assert_order",
+    "judge_order",
+    "kind_of",
+    "observed_order",
+    "verify",
+]
