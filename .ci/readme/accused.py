@@ -33,7 +33,7 @@ def accusations(group: str) -> str:
 
 def _results_of(accusation: Accusation, results: list[Result]) -> list[Result]:
     """Return the results of a script if one version was wrong."""
-    found = [result for result in results if result.script == accusation.script and result.verdict != "undecided"]
+    found = [result for result in results if result.script == accusation.script]
     return found if any(result.verdict == "wrong" for result in found) else []
 
 
@@ -50,15 +50,14 @@ def _link(folder: Path, text: str, path: Path) -> str:
 
 
 def counted() -> str:
-    """Return a sentence on how many sentences have a script and how many versions were run."""
+    """Return a sentence on how many sentences about engines there are, and how many versions were run."""
     rows, results = read_accusations(), read_results()
-    run = {result.script for result in results}
-    scripts = sum(row.script in run for row in rows)
-    versions = len({(row.engine, result.version) for row in rows for result in results if result.script == row.script})
+    run = {(row.engine, result.version) for row in rows for result in results if result.script == row.script}
+    engines = len({engine for engine, _ in run})
     link = _link(PAGES["bodies"].parent, "accusations.csv", FOLDER / "accusations.csv")
     return (
-        f"{scripts} of {len(rows)} sentences about engines have a script; {versions} versions of engines were run.\n"
-        f"{link} also has the sentences without a script.\n"
+        f"{link} has {len(rows)} sentences about engines, each with its script.\n"
+        f"The scripts were run in {len(run)} versions of {engines} engines.\n"
     )
 
 

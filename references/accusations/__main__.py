@@ -1,7 +1,8 @@
 """Run the scripts that show what is wrong in engines, in all installed versions, and write what they print into measured.csv.
 
     python -m conservative.references.accusations                   # all installed engines
-    python -m conservative.references.accusations jolt rapier_js    # some
+    python -m conservative.references.accusations jolt rapier_js    # some engines
+    python -m conservative.references.accusations jolt_damping.mjs  # one script
     python -m conservative.references.accusations --check           # write nothing; exit with 1 if a verdict has changed
     python -m conservative.references.accusations --missing         # names for `conservative engines install`
 
@@ -26,19 +27,20 @@ def main(arguments: list[str] | None = None) -> int:
         description=__doc__,
         formatter_class=argparse.RawTextHelpFormatter,
     )
-    parser.add_argument("engines", nargs="*", metavar="ENGINE")
+    parser.add_argument("names", nargs="*", metavar="NAME", help="an engine or a script; by default all")
     parser.add_argument("--check", action="store_true", help="write nothing; exit with 1 if a verdict has changed")
     parser.add_argument("--missing", action="store_true", help="print the engines that are not installed, and end")
     options = parser.parse_args(arguments)
     accusations = read_accusations()
-    names = dict.fromkeys(accusation.engine for accusation in accusations if accusation.script)
-    if unknown := [name for name in options.engines if name not in names]:
-        raise BadInput("engine", repr(unknown[0]), f"one of {', '.join(names)}")
+    engines = dict.fromkeys(accusation.engine for accusation in accusations)
+    scripts = {accusation.script for accusation in accusations}
+    if unknown := [name for name in options.names if name not in {*engines, *scripts}]:
+        raise BadInput("name", repr(unknown[0]), f"a script, or one of {', '.join(engines)}")
     if options.missing:
         print(" ".join(missing_engines(accusations)))
         return 0
     old, new = read_results(), []
-    for result in measure(set(options.engines) or None):
+    for result in measure(set(options.names) or None):
         print(f"{result.script} {result.version}: {result.printed}: {result.verdict}", flush=True)
         new.append(result)
     if changed := differences(old, new):

@@ -101,11 +101,11 @@ def run(
     return "undecided", f"exit code {done.returncode}: {reason}"
 
 
-def measure(engines: set[str] | None = None) -> Iterator[Result]:
-    """Yield the result of each script in each installed version of its engine, by default of all engines."""
+def measure(names: set[str] | None = None) -> Iterator[Result]:
+    """Yield the result of each script in each installed version of its engine: scripts or engines by name, by default all."""
     today = datetime.date.today().isoformat()
     for accusation in read_accusations():
-        if accusation.script and (engines is None or accusation.engine in engines):
+        if names is None or {accusation.engine, accusation.script} & names:
             for interpreter in find_interpreters(accusation.engine):
                 verdict, printed = interpreter.run(accusation.path, accusation.file_path)
                 yield Result(accusation.script, interpreter.version, verdict, printed, today)
@@ -114,12 +114,14 @@ def measure(engines: set[str] | None = None) -> Iterator[Result]:
 def merge(old: list[Result], new: list[Result]) -> list[Result]:
     """Return the old results with the new ones, in the order of the sentences and versions.
 
-    A result that says the same keeps its date. Results of scripts that are no longer there are left out.
+    A result that says the same keeps its date. Results of scripts that are no longer there are left out, and results without a
+    verdict, for example of an old version without a function that the script calls.
     """
-    found = {(result.script, result.version): result for result in old}
-    for result in new:
+    found: dict[tuple[str, str], Result] = {}
+    for result in [*old, *new]:
         known = found.get((result.script, result.version))
-        if known is None or (known.verdict, known.printed) != (result.verdict, result.printed):
+        same = known is not None and (known.verdict, known.printed) == (result.verdict, result.printed)
+        if result.verdict != "undecided" and not same:
             found[result.script, result.version] = result
     order = [accusation.script for accusation in read_accusations()]
     kept = [result for result in found.values() if result.script in order]
@@ -142,5 +144,4 @@ def differences(old: list[Result], new: list[Result]) -> list[str]:
 
 def missing_engines(accusations: list[Accusation]) -> list[str]:
     """Return the engines of scripts that are not installed."""
-    names = dict.fromkeys(accusation.engine for accusation in accusations if accusation.script)
-    return [name for name in names if not find_interpreters(name)]
+    return [name for name in dict.fromkeys(accusation.engine for accusation in accusations) if not find_interpreters(name)]

@@ -1,8 +1,8 @@
 """Sentences about engines, and what their scripts printed.
 
 `accusations.csv` has a row for each sentence: the page that shows it, the engine, the script in `scripts/`, and the file that
-the script gets, relative to `references`. The sentence is the first line of the script. A row without a script has a sentence
-that waits for one, and is in no generated part of a page. `measured.csv` has a row for each script and version of the engine.
+the script gets, relative to `references`. The sentence is the first line of the script. `measured.csv` has a row for each
+script and version of the engine.
 """
 
 from __future__ import annotations
@@ -29,18 +29,15 @@ class Accusation:
     engine
         Name of the engine, or of a package that is no engine.
     script
-        Name of the script, "" if there is none.
+        Name of the script.
     file
         Path of the file that the script gets, relative to the folder `references`; "" if it gets none.
-    text
-        The sentence of a row without a script.
     """
 
     page: str
     engine: str
     script: str
     file: str
-    text: str
 
     @property
     def path(self) -> Path:
@@ -55,7 +52,7 @@ class Accusation:
     @property
     def sentence(self) -> str:
         """The sentence, which is the first line of the script."""
-        return first_line(self.path) if self.script else self.text
+        return first_line(self.path)
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,9 @@
 """Box3D in single precision, by its interface in C from `robox3d`, in the loop of that package (`rxWorldStepN`).
 
 A body has the shape of a solid ball with its mass and mean moment: the engine compares the speed of the shape's surface with
-the threshold of sleeping, so that a body without a shape falls asleep at any rate. A body about a fixed point is on a spherical
-joint. Switched off: sleeping (`enableSleep`), the limit of 400 m/s (`maximumLinearSpeed`), and the limit of the rotation in a
-step to an eighth of a turn (`allowFastRotation`), which is 78.5 rad/s at steps of 0.01 s, with any number of substeps.
+the threshold of sleeping. A body about a fixed point is on a spherical joint. Switched off: sleeping (`enableSleep`), the
+limit of 400 m/s (`maximumLinearSpeed`), and the limit of the rotation in a step to an eighth of a turn (`allowFastRotation`),
+which is 78.5 rad/s at steps of 0.01 s, with any number of substeps.
 
 Parameters
 ----------

@@ -1,8 +1,7 @@
 """Brax on a free joint, on the CPU. JAX compiles the whole run; compilation is not timed.
 
 Nothing had to be switched off: damping (`ang_damping`, `vel_damping`) and scaling of inertia (`spring_inertia_scale`) are 0 by
-default. "spring" and "positional" have no gyroscopic term, so a free body turns about its initial axis. "positional" takes
-2 sin(turn / 2) / dt for the rate after a step, so that fast bodies lose energy.
+default. "spring" and "positional" have no gyroscopic term. "positional" takes 2 sin(turn / 2) / dt for the rate after a step.
 
 Parameters
 ----------

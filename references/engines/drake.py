@@ -4,8 +4,8 @@ A free body is on Drake's quaternion floating joint. A body about a fixed point 
 whose coordinates are roll, pitch and yaw: errors grow when the first principal axis comes near the vertical, and a run in which
 it reaches the vertical ends there. A fixed spring with a rest length is a `LinearSpringDamper`. Other fields, except gravity,
 are a `LeafSystem` in Python, which Drake calls in each evaluation. Switched off: error control (`set_fixed_step_mode`), unless
-an accuracy is given or the integrator is "default". After a fixed step of "cenic", the cache is invalidated: here, and not in a
-script of Drake alone, `EvalBodyPoseInWorld` returned the pose before the step.
+an accuracy is given or the integrator is "default". After a fixed step of "cenic", the cache is invalidated
+(`references/accusations/scripts/drake_cenic_pose.py`).
 
 Parameters
 ----------

@@ -1,7 +1,7 @@
 """JaxSim on a floating base, on the CPU. JAX compiles the whole run; compilation is not timed.
 
 Nothing is switched off: without shapes there is no contact, and damping belongs to joints, of which there are none.
-`RungeKutta4Fast` raises if there are no points of contact. One of its packages, pptree, has no wheel:
+JaxSim's `RungeKutta4Fast` is not offered. One of its packages, pptree, has no wheel:
 `conservative engines install jaxsim --allow-build`.
 
 Parameters

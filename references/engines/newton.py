@@ -3,8 +3,8 @@
 Switched off: angular damping of `SolverSemiImplicit` and `SolverFeatherstone`, which is 0.05 by default, and contacts of
 `SolverMuJoCo`. `SolverKamino` solves with DVI on sparse matrices, as in Newton's example `basic_dzhanibekov`: thirty times as
 fast as its default here, with the same motion. Warp records a step once and replays it; from Python a step takes a hundred
-times as long. Only `SolverVBD` is stepped from Python, because a record loses what it keeps from step to step, and with it
-all motion. Kernels are compiled when a run is prepared, once in the life of an environment, which takes one to four minutes
+times as long. Only `SolverVBD` is stepped from Python, because it keeps values from step to step that our record does not
+contain. Kernels are compiled when a run is prepared, once in the life of an environment, which takes one to four minutes
 per solver.
 
 Parameters
@@ -61,7 +61,7 @@ DUMMY = (0.1, 0.2, 0.3), np.array([[2.0, 0.1, 0.2], [0.1, 3.0, 0.3], [0.2, 0.3, 
 WITH_MEMORY = ("VBD", "Kamino")
 """Solvers that keep more than the state from step to step, which `reset` clears."""
 NOT_RECORDED = ("VBD", "MuJoCo_cpu_euler", "MuJoCo_cpu_implicitfast", "MuJoCo_cpu_rk4")
-"""A replay of VBD's step mistakes the pose of each step for the previous one, so that nothing moves. MuJoCo is not Warp's."""
+"""A record does not contain the poses that VBD keeps from step to step. MuJoCo is not Warp's."""
 
 
 def prepare(given):

@@ -14,7 +14,7 @@ from .shared import stepped
 ENGINE = {
     "package": "nimblephysics",
     "module": "nimblephysics",
-    "requirements": ("numpy<2",),  # it crashes with NumPy 2
+    "requirements": ("numpy<2",),  # the versions with which it was run
     "oldest": "0.10",
     "title": "semi-implicit Euler",
     "fields": ("UniformGravity",),

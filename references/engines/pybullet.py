@@ -96,12 +96,10 @@ def prepare(given):
 
 def _build_free(bullet, given):
     maximal = given.body == "maximal"
-    # In maximal coordinates, a body without a shape does not move.
-    shape = bullet.createCollisionShape(bullet.GEOM_SPHERE, radius=0.1) if maximal else -1
     arm = given.R0 @ given.com if hasattr(given, "p_WB0") else np.zeros(3)
     place = (getattr(given, "p_WB0", 0) + arm).tolist()
-    body = bullet.createMultiBody(given.mass, shape, -1, place, _x_first(given.q0), useMaximalCoordinates=maximal)
-    # Without its mass, a body in maximal coordinates would have a position that is not finite.
+    body = bullet.createMultiBody(given.mass, -1, -1, place, _x_first(given.q0), useMaximalCoordinates=maximal)
+    # With its mass, which a body in maximal coordinates does not have yet: accusations/scripts/pybullet_without_shape.py.
     bullet.changeDynamics(body, -1, mass=given.mass, localInertiaDiagonal=given.moments_com.tolist())
     if not given.as_installed:
         _switch_off(bullet, body, -1)

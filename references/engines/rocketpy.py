@@ -1,7 +1,7 @@
 """RocketPy's `Flight` on a rocket without a motor, in double precision: SciPy's solvers on its own equations, in Python.
 
 Switched off: gravity, the atmosphere's pressure and with it drag, and the rail. The functions of time that a `Flight` returns
-interpolate between steps, with errors far above the solver's, so each sample is the end of a flight that continues the
+interpolate between steps, so each sample is the end of a flight that continues the
 previous one (`initial_solution`). The solver is started again at each sample.
 
 Parameters
@@ -12,8 +12,7 @@ rtol
     Relative tolerance, above 0 and below 1, 1e-6 by default in RocketPy. The absolute one is `rtol` for the quaternion, and
     `rtol` times the initial rate for rates.
 equations
-    "standard", or "solid_propulsion", RocketPy's older equations. Those set the rates to 0 before anything else, with and
-    without a burning motor: the attitude stands still.
+    "standard", or "solid_propulsion", RocketPy's older equations (see `references/accusations/scripts/rocketpy_rates.py`).
 as_installed
     True if there is one flight, whose functions of time are read at the samples, with RocketPy's absolute tolerances: 1e-6
     for the quaternion and 1e-3 rad/s for rates.
@@ -49,7 +48,7 @@ PLACE = [0.0, 0.0, 1e4, 0.0, 0.0, 0.0]
 ANY = 6 * [1.0]
 """Absolute tolerances of these, which do not change."""
 BURNT = 1.0
-"""Initial time, s, of "solid_propulsion", whose equations fail without a motor during the first second."""
+"""Initial time, s, of "solid_propulsion": the burn time of an empty motor."""
 
 
 def prepare(given):
