@@ -19,16 +19,16 @@ from conservative.method import Method, Role, Run
 from conservative.method_info import Maker, MethodInfo
 from conservative.methods.many import Block, RunMany
 from conservative.methods.units import in_own_units
-from conservative.potentials.turning import static_part
+from conservative.potentials.turning import Turning, static_part
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
 from ..engine import STEP_LIMIT, EngineRun, limit_reason, pace_reason, symmetric_axes, version
 from ..environments.plain_numbers import take_axes
 from ..heyoka_equations import accelerations, forms, formulations
-from ..samples import to_body_axes
+from ..samples import Delivered, States, bind_conversion, to_body_axes
 
-FRAMES = ("body", "non_spinning", "lean", "base_vectors")
+FRAMES = ("body", "non_spinning", "lean", "base_vectors", "angle")
 _TOLERANCES_AND_FRAMES = tuple(f"tol={tol},frame={frame}" for frame in FRAMES[:3] for tol in ("1e-6", "1e-9", "1e-12", "1e-16"))
 
 SMALLEST_TOL = 1e-20
@@ -61,7 +61,8 @@ class Heyoka(Method):
         row is their cross product, and the rows are not orthonormalised. "lean", the fastest: rates and one angle (asymmetric
         free body); axis, momentum and one angle (symmetric top that stays away from one of the poles); otherwise the
         non-spinning frame if there is one, or base vectors. At equal error, base vectors take 17 to 30 % less time than "body"
-        (measured in four fields).
+        (measured in four fields). "angle", for a field that does not turn: rates, the field's axis in the body and one angle
+        about it, in axes that a trial run chooses for each body, so that the field's axis stays away from the pole of the angle.
     width, driver
         Settings of `prepare_many`: the number of bodies in a batch, by default the number that heyoka recommends for the
         processor; and whether batches run in a loop ("batch") or in heyoka's function for ensembles, on one thread
@@ -91,7 +92,7 @@ class Heyoka(Method):
     order = None
     method_info: ClassVar[MethodInfo] = MethodInfo(
         # Base vectors are the cheapest frame to read if many samples are kept. Lean is often the same: one tolerance is enough.
-        variants=(*_TOLERANCES_AND_FRAMES, "tol=1e-9,frame=base_vectors"),
+        variants=(*_TOLERANCES_AND_FRAMES, "tol=1e-9,frame=base_vectors", "tol=1e-9,frame=angle"),
         report=("", "frame=non_spinning", "frame=lean"),
         suite=("tol=1e-9", "tol=1e-16"),
         many=(
@@ -131,6 +132,8 @@ class Heyoka(Method):
         if potential is not None and type(potential) not in accelerations.READERS:
             kind, table = type(potential).__name__, f"{accelerations.__name__}.READERS"
             return f"no heyoka expressions for {kind}; add them to {table}"
+        if self.frame == "angle" and isinstance(scene.potential, Turning):
+            return "an angle about the field's axis needs a field that does not turn"
         if self.frame == "non_spinning" and symmetric_axes(scene) is None:
             return "a non-spinning frame needs a body symmetric about an axis, free or with its centre of mass on that axis"
         return None
@@ -167,11 +170,16 @@ class Heyoka(Method):
             _begin(integrator, parameters, problem.start)
             return _bind_loop(integrator, problem.start, t)
 
+        def bind_final() -> Callable[[], Delivered]:
+            integrator = integrators.copy()
+            _begin(integrator, parameters, problem.start)
+            return _bind_final(integrator, problem.start, end, samples(np.empty((1, 0, 0))), problem.axes.R_BF)
+
         def convert(result: tuple[Array, int, str]) -> Trajectory:
             states, steps, reason = result
             return problem.axes.trajectory(grid, label, samples(states[None]), Counters(steps), reason)
 
-        return EngineRun(loop, convert, bind)
+        return EngineRun(loop, convert, bind, bind_final)
 
     def integrators(self, problem: formulations.Formulation, width: int = 0) -> forms.Integrators:
         """Return compiled integrators of a scene, of `width` bodies at once."""
@@ -237,6 +245,21 @@ def _bind_loop(integrator: Any, start: Array, t: Array) -> Callable[[], Array]:
         return np.asarray(grid(t)[-1])
 
     return to_end if len(t) == 2 else to_samples if len(t) <= _FEW_SAMPLES else over_grid
+
+
+def _bind_final(
+    integrator: Any, start: Array, t_end: float, states: States, R_BF: Array
+) -> Callable[[], Delivered]:
+    """Return the loop to t_end, s, as a user of heyoka writes it, with the attitude and rates in body axes of the final state."""
+    state, until, convert = integrator.state, integrator.propagate_until, bind_conversion(t_end, states, R_BF)
+
+    def to_final() -> Delivered:
+        state[:] = start
+        integrator.time = 0.0
+        until(t_end)
+        return convert(state)
+
+    return to_final
 
 
 def _over_grid(integrator: Any, t: Array) -> tuple[Array, int, str]:
