@@ -178,6 +178,18 @@ def bootstrap(logs: Sequence[Sequence[float]]) -> tuple[float, float]:
     return math.exp(low), math.exp(high)
 
 
+def bound_share(count: int, total: int) -> float:
+    """Return the largest share of a population that `count` hits among `total` random members allow, with `CONFIDENCE`.
+
+    One-sided (Clopper & Pearson 1934). Without a hit it is about 3 / total, the rule of three. NaN for a total of 0.
+    """
+    from scipy.special import betaincinv
+
+    if count >= total:
+        return 1.0 if total else math.nan
+    return float(betaincinv(count + 1, total - count, CONFIDENCE))
+
+
 def speed_ratios(
     ours: pd.DataFrame, theirs: pd.DataFrame, scenes: Iterable[str], errors: Sequence[float]
 ) -> tuple[SpeedRatio, ...]:
@@ -225,6 +237,21 @@ class Ratios:
     def open(self) -> int:
         """Number of bodies on which both sides reach the error and neither is faster beyond the interval."""
         return sum(not (pair.won or pair.lost) for pair in self.both)
+
+    @property
+    def unreached(self) -> int:
+        """Number of cases in which neither side reaches the error."""
+        return sum(pair.ours is None and pair.theirs is None for pair in self.speed_ratios)
+
+    @property
+    def scenes(self) -> int:
+        """Number of bodies of the cases."""
+        return len({pair.scene for pair in self.speed_ratios})
+
+    @property
+    def share_lost(self) -> float:
+        """Largest share of bodies like these on which the other side wins a case (see `bound_share`)."""
+        return bound_share(len({pair.scene for pair in self.speed_ratios if pair.lost}), self.scenes)
 
     @property
     def ratio(self) -> float:

@@ -47,8 +47,9 @@ Law = tuple[EngineAxes, Acceleration, list[float]]
 def express_field(scene: Scene, axes: EngineAxes | None = None) -> tuple[Array, Array, Law]:
     """Return the field of a scene whose potential, or the potential that turns, is None or one of `READERS`.
 
-    `axes` are principal axes that the law keeps; by default it orders them. The result is the rotation R_WD (3, 3) whose third column is the field's axis in world axes, the rates (3,) of the axes D,
-    rad/s, in D, and the law. The first rate is 0. The field is constant in D.
+    `axes` are principal axes that the law keeps; by default it orders them. The result is the rotation R_WD (3, 3) whose third
+    column is the field's axis in world axes, the rates (3,) of the axes D, rad/s, in D, and the law. The first rate is 0. The
+    field is constant in D.
     """
     potential, given, turn_D = static_part(scene.potential), axes or principal_axes(scene), np.zeros(3)
     line = None if potential is None else potential.axis_W
@@ -86,7 +87,7 @@ def attraction(parameters: Expressions, g: Expressions, last: int = 2) -> list[E
 @cache
 def _with_last(acceleration: Callable[..., list[Expression]], last: int) -> Acceleration:
     """Return a pull whose component `last` follows from the two others: the same object each time, as forms are compared."""
-    return acceleration if last == 2 else partial(acceleration, last=last)  # noqa: PLR2004
+    return acceleration if last == 2 else partial(acceleration, last=last)
 
 
 def gradient(parameters: Expressions, g: Expressions) -> list[Expression]:
