@@ -260,8 +260,15 @@ class Ratios:
 
     @cached_property
     def interval(self) -> tuple[float, float]:
-        """Interval of the geometric mean over bodies and processes like these (see `bootstrap`)."""
-        return bootstrap([pair.logs for pair in self.both])
+        """Interval of the geometric mean over bodies and processes like these (see `bootstrap`).
+
+        The cases of one body are not independent, so that their mean is one value.
+        """
+        cases: dict[str, list[list[float]]] = {}
+        for pair in self.both:
+            cases.setdefault(pair.scene, []).append(pair.logs)
+        means = [[math.fsum(process) / len(process) for process in zip(*logs, strict=False)] for logs in cases.values()]
+        return bootstrap(means)
 
     @property
     def worst(self) -> float:
