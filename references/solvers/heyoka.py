@@ -98,12 +98,13 @@ class Heyoka(Method):
     method_info: ClassVar[MethodInfo] = MethodInfo(
         # Base vectors are the cheapest frame to read if many samples are kept. Lean is often the same: one tolerance is enough.
         variants=(*_TOLERANCES_AND_FRAMES, "tol=1e-9,frame=base_vectors", "tol=1e-9,frame=angle"),
-        fastest=("fast_math=on", "", "frame=lean", "frame=lean,fast_math=off", "frame=angle"),
+        fastest=("fast_math=on", "", "frame=lean", "frame=lean,fast_math=off", "tol=1e-9,frame=angle"),
         report=("", "frame=non_spinning", "frame=lean"),
         suite=("tol=1e-9", "tol=1e-16"),
         many=(
             *("frame=base_vectors", "frame=base_vectors,width=8", "frame=base_vectors,width=16"),
             *("frame=base_vectors,driver=ensemble", "frame=lean", "frame=base_vectors,width=8,numbers=compiled"),
+            *("", "fast_math=on", "width=8", "width=8,fast_math=on", "width=16", "width=16,fast_math=on"),
         ),
         colour="green",
         supports=frozenset({Feature.TURNING, Feature.ROTOR}).union(*map(features_of, accelerations.READERS)),
