@@ -104,7 +104,7 @@ class Heyoka(Method):
         many=(
             *("frame=base_vectors", "frame=base_vectors,width=8", "frame=base_vectors,width=16"),
             *("frame=base_vectors,driver=ensemble", "frame=lean", "frame=base_vectors,width=8,numbers=compiled"),
-            *("", "fast_math=on", "width=8", "width=8,fast_math=on", "width=16", "width=16,fast_math=on"),
+            *("", "width=8", "width=8,fast_math=on", "width=16", "frame=lean,width=8"),
         ),
         colour="green",
         supports=frozenset({Feature.TURNING, Feature.ROTOR}).union(*map(features_of, accelerations.READERS)),
