@@ -322,7 +322,7 @@ def call_rows(table: pd.DataFrame) -> Iterator[Row]:
     both = both.assign(
         field=fields, kind=kinds, loop=both["time_loop"] * duration, added=(both["time"] - both["time_loop"]) * duration
     )
-    for (field, kind), rows in both.groupby(["field", "kind"]):
+    for (field, kind), rows in both.groupby(["field", "kind"], sort=False):
         for quantity in ("loop", "added"):
             value = rows[quantity].median()
             yield {"scene": field, "name": f"time of a call, {kind}", "quantity": quantity, "unit": "us", "value": value}
