@@ -13,11 +13,12 @@ from typing import Any
 import numpy as np
 
 from ..attitude import Array, Triple, axes_about, to_quaternion, triple
+from ..deferred_imports import kernels
 from ..errors import BadInput
 from ..invariants import jacobi_scale, largest_momentum
 from ..potentials.load import load_field
 from ..potentials.potential import depends_on_time
-from ..potentials.turning import Turning
+from ..potentials.turning import Orbit, Turning
 from ..potentials.uniform_gravity import UniformField
 from ..scene import Scene
 from .non_spinning import Resolved
@@ -43,6 +44,8 @@ class PrincipalStart:
         Momentum of the rotor, kg m^2/s; None without one, or if `field` has it with its motor. `L` does not contain it.
     spin
         In the non-spinning frame, the omitted rate about the third axis, rad/s, and 1/J3; otherwise None.
+    orbit
+        The `Orbit` to whose axes `q` and the samples are relative; None if they are relative to the world.
     """
 
     J: Triple
@@ -53,6 +56,12 @@ class PrincipalStart:
     field: Any
     rotor: Triple | None = None
     spin: tuple[float, float] | None = None
+    orbit: Orbit | None = None
+
+    def axes(self, dt: float) -> Array:
+        """Return the numbers by which samples with steps dt, s, are converted to body axes (`kernels.samples.gather_axes`)."""
+        axes: Array = kernels("samples").gather_axes(self.J_inverse, self.spin, self.R_BP, self.orbit, dt)
+        return axes
 
 
 def principal_start(scene: Scene, frame: Resolved = "body") -> PrincipalStart:
