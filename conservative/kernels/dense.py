@@ -107,7 +107,10 @@ def copy(values, at, out, to, n):
 
 @kernel
 def complete(result, n_steps, sampled, h, first, axes, R_WB, w_WB_B):
-    """Fill the first sample and turn all from the axes of an orbit. Return the fields of the result and the number of samples."""
+    """Fill the first sample, and turn the others from the axes of an orbit.
+
+    Return the fields of the result and the number of samples.
+    """
     copy(first, 0, R_WB.reshape(-1), 0, 9)
     copy(first, 9, w_WB_B.reshape(-1), 0, 3)
     n = len(R_WB) if result.done == n_steps else 1 + result.done // sampled

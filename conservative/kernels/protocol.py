@@ -12,10 +12,11 @@
 
 Where a step can fail, the constant `FAILURE` of the file says why.
 
-Python calls `enter(*model, *coefficients, *workspace, *output)`, which is `march` and `deliver`, with a plain tuple for a result: numba finds the class
-of a named tuple that passes between Python and machine code by unpickling it, which costs 5 us for each; loose values cost
-nothing. Where `enter` cuts them follows from the fields (`find_ends`); a value too many or too few is an error when `enter` is
-compiled. Each file has its own: numba does not find the code of a closure over a compiled function in its cache again.
+Python calls `enter(*model, *coefficients, *workspace, *output)`, which is `march` and `deliver`, with a plain tuple for a
+result: numba finds the class of a named tuple that passes between Python and machine code by unpickling it, which costs 5 us
+for each; loose values cost nothing. Where `enter` cuts them follows from the fields (`find_ends`); a value too many or too few
+is an error when `enter` is compiled. Each file has its own: numba does not find the code of a closure over a compiled function
+in its cache again.
 
 A named tuple as an argument takes 1.1 us as well. `taylor` and `dense`, whose runs can take 1 us, therefore have `bind` instead
 of `enter`: it returns a function without model and coefficients, and passes the model as an array of its numbers.

@@ -29,7 +29,7 @@ import numpy as np
 from ..potentials.turning import Turned
 from . import entry, kernel, small
 from .axial import FLAT, TINY, significant
-from .compiler.lanes import REGISTER, cache_by_types, gather_numbers, load_rows, save_rows
+from .compiler.lanes import REGISTER, cache_by_identity, cache_by_types, gather_numbers, load_rows, save_rows
 from .compiler.series import Series, Vectors, sum_orders, sum_to_order
 from .compiler.signals import call_handlers, end_of_block
 from .compiler.traced import trace
@@ -377,8 +377,15 @@ def enter_like(like):
 
 def bind(model, coefficients, axes):
     """Return `march` as Python calls it (`protocol`), without the arguments that are given here."""
-    numbers, like = gather_numbers((model, coefficients.h))
-    return partial(enter_like(like), np.append(numbers, axes), coefficients.order)
+    numbers, enter = gather_model(model)
+    return partial(enter, np.concatenate([numbers, [coefficients.h], axes]), coefficients.order)
+
+
+@cache_by_identity
+def gather_model(model):
+    """Return the numbers of a model, and `enter` for it."""
+    numbers, like = gather_numbers(model)
+    return numbers, enter_like((like, 0.0))
 
 
 class Bodies(NamedTuple):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 from ..batch import Batch
@@ -24,6 +25,7 @@ from .run_kernel import prepare_run
 from .taylor_dense import prepare_dense
 from .taylor_lanes import prepare_bodies
 from .taylor_model import find_model
+from .taylor_starts import bind_restart
 from .units import in_own_units
 
 LOWEST, DEFAULT, HIGHEST = 4, 14, 18
@@ -135,7 +137,9 @@ class Taylor(Method):
         label, (start, model) = self.label, scene.derive(find_model, self.tolerance is None)
         if self.tolerance is None:
             kernel = kernels("taylor")
-            return prepare_run(scene, grid, label, start, kernel, model, kernel.Coefficients(self.terms, grid.dt))
+            coefficients = kernel.Coefficients(self.terms, grid.dt)
+            bind = partial(bind_restart, scene, start, model, None)
+            return prepare_run(scene, grid, label, start, kernel, model, coefficients, bind_restart=bind)
         return prepare_dense(scene, grid, label, start, model, self.terms, self.tolerance)
 
     def prepare_many(self, bodies: Batch, grid: Grid) -> RunMany | None:

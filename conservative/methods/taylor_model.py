@@ -43,11 +43,16 @@ def find_model(scene: Scene, reduced: bool) -> tuple[PrincipalStart, Any]:
     reduction = None
     if reduced and free and momentum > 0 and not rotor:
         reduction = reduce_free(start, R_DP)
-    elif reduced and isinstance(start.field, UniformField) and loose[2] == 0:
+    elif reduced and is_reducible(start):
         reduction = reduce_top(start, R_DP)
     field, *rows = reduction or (kernel.Free(momentum) if free else start.field, triple(R_DP[2]), triple(R_DP[0]))
     body = start.J, start.J_inverse, field, loose, invariant_scales(scene)
     return start, kernel.Model(*body, quadruple(R_WD), *rows, start.q, start.L, rotor)
+
+
+def is_reducible(start: PrincipalStart) -> bool:
+    """Return whether the motion is that of a symmetric top in gravity, which is reduced away from the vertical."""
+    return isinstance(start.field, UniformField) and start.spin is not None
 
 
 def reduce_free(start: PrincipalStart, R_DP: Array) -> tuple[Any, ...]:
