@@ -84,7 +84,11 @@ def test_a_run_from_another_start_is_the_run_of_the_scene_with_that_start(name: 
         np.testing.assert_array_equal(found.scene.w_WB_B0, start[1])
         # measured 2e-14 with Taylor, whose numbers are made by other code; otherwise 0
         np.testing.assert_allclose(found.R_WB, expected.R_WB, rtol=0, atol=1e-12)
-        np.testing.assert_allclose(found.w_WB_B, expected.w_WB_B, rtol=0, atol=1e-12 * np.abs(expected.w_WB_B).max())
+        # The round-off of a momentum, over the moment of a rod, is a rate about its axis: measured 0.2 times this.
+        moments = scene.body.moments
+        rounding = np.finfo(float).eps * np.linalg.norm(scene.body.momentum(start[1])) / moments.min()
+        off = 1e-12 * np.abs(expected.w_WB_B).max() + rounding
+        np.testing.assert_allclose(found.w_WB_B, expected.w_WB_B, rtol=0, atol=off)
         assert (found.supplied is None) == (expected.supplied is None)
         assert found.counters.steps == expected.counters.steps
     np.testing.assert_array_equal(run().R_WB, own.R_WB)
