@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from functools import wraps
+from functools import partial, wraps
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
@@ -18,9 +18,11 @@ from .invariants import AXIAL_MOMENTUM
 from .method_info import Maker, MethodInfo, Purpose, call_with_settings, maker_of, setting_texts, settings_text
 from .method_info import Role as Role
 from .scene import Scene
+from .starts import with_starts
 from .trajectory import Bounds, Trajectory, cut_at_failure, find_misplaced, find_mistake
 
-Run = Callable[[], Trajectory]
+Run = Callable[..., Trajectory]
+"""The run of a scene on a grid, `run()`, and of other starts of its body, `run(R_WB0, w_WB_B0)`: see `Method.prepare`."""
 
 
 def _ask_features(unsupported: Callable[[Any, Scene], str | None]) -> Callable[[Any, Scene], str | None]:
@@ -42,7 +44,7 @@ def _refuse(prepare: Callable[[Any, Scene, Grid], Run]) -> Callable[[Any, Scene,
         if reason := method.unsupported(scene):
             got = f"{method.name} for the scene {scene.name!r}"
             raise Unsupported("method", got, f"a scene that it supports ({reason})")
-        return prepare(method, scene, grid)
+        return with_starts(prepare(method, scene, grid), partial(checked, method), scene, grid)
 
     return checked
 
@@ -183,7 +185,14 @@ class Method(ABC):
         """Return the run of a scene on a grid: sentences 4 to 7 of the contract.
 
         It is not checked; use `check(scene, grid, run())`. Every override raises `Unsupported` for a scene that is not
-        supported. The run can have an attribute `own_loop`, a function that integrates and does not convert the samples.
+        supported. The run can have an attribute `own_loop`, a function that integrates and makes no `Trajectory`.
+
+        For loops over initial states, every run can also be called as `run(R_WB0, w_WB_B0)`, with another attitude (3, 3) or
+        SciPy `Rotation`, and other rates (3,), rad/s, body axes; everything else of the scene stays. The trajectory is that of
+        `prepare` for the scene with this start, to round-off. Its arrays, and its scene, are overwritten by the next such call
+        of the same run: copy what has to stay. `run()` starts from the scene's initial state as before. With `Taylor` in SI
+        units, a start takes 2 us beside its steps; all other methods prepare the run again. `BadInput` is raised for a start
+        that `Scene` does not accept.
         """
 
     def prepare_many(self, bodies: Any, grid: Grid) -> Any:

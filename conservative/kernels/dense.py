@@ -23,6 +23,7 @@ from .compiler.signals import call_handlers, end_of_block
 from .compiler.traced import fast_exp2, fast_log2, trace
 from .compiler.vector import accumulate, every, fill_like, fuse
 from .protocol import Result, loosen
+from .samples import END, RATE, turn_by_orbit
 from .taylor import BETWEEN, ENOUGH, LEFT, begin, correct, find_sample, grow, project
 from .taylor import FAILURE as FAILURE
 from .taylor import PAUSE as PAUSE
@@ -97,12 +98,35 @@ def find_turn(spin, t, further):
     return (cos * further[0] - sin * further[1], sin * further[0] + cos * further[1]) if further else (cos, sin)
 
 
+@kernel
+def copy(values, at, out, to, n):
+    """Copy n numbers of one array, from `at` on, to another one, from `to` on."""
+    for i in range(n):
+        out[to + i] = values[at + i]
+
+
+@kernel
+def complete(result, n_steps, sampled, h, first, axes, R_WB, w_WB_B):
+    """Fill the first sample, and turn the others from the axes of an orbit.
+
+    Return the fields of the result and the number of samples.
+    """
+    copy(first, 0, R_WB.reshape(-1), 0, 9)
+    copy(first, 9, w_WB_B.reshape(-1), 0, 3)
+    n = len(R_WB) if result.done == n_steps else 1 + result.done // sampled
+    if axes[RATE] != 0.0:
+        for i in range(1, n):
+            turn_by_orbit(axes, min(i * sampled, n_steps) * h, i, R_WB)
+    return (*loosen(result), n)
+
+
 @partial(kernel, forceinline=True)
-def march(model, frame, order, h, largest, n_steps, sampled, pause, lanes, R_WB, w_WB_B):
-    """Fill R_WB (9 n,) and w_WB_B (3 n,) from the second sample on, n `REGISTER` more than the samples (`protocol`).
+def march(model, frame, order, h, largest, n_steps, sampled, pause, lanes, room, R_WB, w_WB_B):
+    """Fill R_WB (9 n,) and w_WB_B (3 n,) from the second sample on (`protocol`).
 
     The order is even. The grid's times are h, s, apart. `largest` is as `bind` passes it to `expand`, `lanes` are the numbers
-    0, 1, ... of the lanes. A step that cannot be projected fails; the size is the relative defect that remains at its end.
+    0, 1, ... of the lanes. `room` (12 `REGISTER`,) has the samples of the lanes if not all of them are samples of the run. A
+    step that cannot be projected fails; the size is the relative defect that remains at its end.
     """
     field, g, a = model.field, model.g, model.a
     body, K, w = begin(model)
@@ -134,11 +158,15 @@ def march(model, frame, order, h, largest, n_steps, sampled, pause, lanes, R_WB,
                 g2, a2, w2, _, defects = project(field, body, ENOUGH, g2, a2, w2, defects, needs)
                 good = every(defects < LEFT)
                 sample = find_sample(frame, find_turn(frame.spin, following * h, further), g2, a2, w2)
-                save_columns(R_WB, 9 * row, 9, sample[:9])
-                save_columns(w_WB_B, 3 * row, 3, sample[9:])
+                direct = 3 * (row + REGISTER) <= len(w_WB_B)
+                save_columns(R_WB if direct else room, 9 * row if direct else 0, 9, sample[:9])
+                save_columns(w_WB_B if direct else room, 3 * row if direct else 9 * REGISTER, 3, sample[9:])
                 for i in range(REGISTER):
                     # A shorter last interval does not fit the angles of the lanes.
                     if good and done < n_steps and ahead <= step and (i == 0 or following - done == sampled):
+                        if not direct:
+                            copy(room, 9 * i, R_WB, 9 * row, 9)
+                            copy(room, 9 * REGISTER + 3 * i, w_WB_B, 3 * row, 3)
                         row, done, following = row + 1, following, min(following + sampled, n_steps)
                         ahead = (following - whole) - rest
             g, a, w = g1, a1, w1
@@ -154,18 +182,27 @@ def march(model, frame, order, h, largest, n_steps, sampled, pause, lanes, R_WB,
 
 @cache_by_types
 def enter_like(like):
-    """Return `march` as Python calls it (`taylor.enter_like`). The last `REGISTER` numbers belong to the lanes."""
+    """Return `march` as Python calls it (`taylor.enter_like`)."""
 
     @entry
     def enter(numbers, order, n_steps, sampled, pause, R_WB, w_WB_B):
+        """Fill the samples. The last numbers are the lanes, room for samples, the first sample and the axes of all samples."""
         model, frame, h, largest = load_rows(numbers, 0, 1, like, 1)
-        lanes = load(numbers, len(numbers) - REGISTER, REGISTER)
-        return loosen(march(model, frame, order, h, largest, n_steps, sampled, pause, lanes, R_WB, w_WB_B))
+        at = len(numbers) - END
+        axes, first, room = numbers[at:], numbers[at - 12 : at], numbers[at - 12 - 12 * REGISTER : at - 12]
+        lanes = load(numbers, at - 12 - 13 * REGISTER, REGISTER)
+        flat = R_WB.reshape(-1), w_WB_B.reshape(-1)
+        result = march(model, frame, order, h, largest, n_steps, sampled, pause, lanes, room, *flat)
+        return complete(result, n_steps, sampled, h, first, axes, R_WB, w_WB_B)
 
     return enter
 
 
-def bind(model, frame, order, h, tolerance):
-    """Return `march` as Python calls it (`protocol`), without the arguments that are given here."""
+def bind(model, frame, order, h, tolerance, first, axes):
+    """Return `march` as Python calls it (`protocol`), without the arguments that are given here.
+
+    `first` (12,) are attitude, by rows, and rates, rad/s, of the first sample, `axes` are from `samples.gather_axes`.
+    """
     numbers, like = gather_numbers((model, frame, h, 2.0 * math.log2(SHARE * tolerance)))
-    return partial(enter_like(like), np.append(numbers, np.arange(float(REGISTER))), order)
+    lanes, room = np.arange(float(REGISTER)), np.zeros(12 * REGISTER)
+    return partial(enter_like(like), np.concatenate([numbers, lanes, room, first, axes]), order)

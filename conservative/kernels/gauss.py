@@ -33,7 +33,7 @@ from .compiler.signals import call_handlers
 from .compiler.traced import trace
 from .compiler.vector import accumulate, add, cross, dot, fuse, product, scale, subtract, times, vertical
 from .fields import whole
-from .protocol import Result, Workspace, find_ends, loosen, record
+from .protocol import Output, Result, Workspace, deliver, find_ends, record
 from .taylor import shortest_move
 
 FAILURE = "the step is too long for the iteration"
@@ -366,14 +366,15 @@ def march(model, coefficients, workspace):
     return Result(n_steps, n_steps * s, work, None, math.sqrt(square), False)
 
 
-MODEL_END, COEFFICIENTS_END = find_ends(Model, Coefficients)
+MODEL_END, COEFFICIENTS_END, WORKSPACE_END = find_ends(Model, Coefficients)
 
 
 @entry
 def enter(*loose):
     """`march` as Python calls it (`protocol`)."""
     model, coefficients = Model(*loose[:MODEL_END]), Coefficients(*loose[MODEL_END:COEFFICIENTS_END])
-    return loosen(march(model, coefficients, Workspace(*loose[COEFFICIENTS_END:])))
+    workspace = Workspace(*loose[COEFFICIENTS_END:WORKSPACE_END])
+    return deliver(march(model, coefficients, workspace), workspace, Output(*loose[WORKSPACE_END:]))
 
 
 @kernel

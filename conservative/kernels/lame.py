@@ -19,7 +19,7 @@ from .compiler.lanes import WIDTH, load, load_rows, save_rows
 from .compiler.signals import call_handlers, end_of_block
 from .compiler.vector import add, choose, cross, product
 from .compiler.vector import scale as scale_vector
-from .protocol import Result, Workspace, find_ends, loosen, record, record_lanes
+from .protocol import Output, Result, Workspace, deliver, find_ends, record, record_lanes
 from .twofold import minus, over, plus, scale, times, two
 
 TERMS = 22
@@ -350,14 +350,15 @@ def march(model, coefficients, workspace):
     return Result(n_steps, n_steps * parts, 0, None, 0.0, False)
 
 
-MODEL_END, COEFFICIENTS_END = find_ends(Model, Coefficients)
+MODEL_END, COEFFICIENTS_END, WORKSPACE_END = find_ends(Model, Coefficients)
 
 
 @entry
 def enter(*loose):
     """`march` as Python calls it (`protocol`)."""
     model, coefficients = Model(*loose[:MODEL_END]), Coefficients(*loose[MODEL_END:COEFFICIENTS_END])
-    return loosen(march(model, coefficients, Workspace(*loose[COEFFICIENTS_END:])))
+    workspace = Workspace(*loose[COEFFICIENTS_END:WORKSPACE_END])
+    return deliver(march(model, coefficients, workspace), workspace, Output(*loose[WORKSPACE_END:]))
 
 
 @entry

@@ -26,7 +26,7 @@ from . import entry, kernel, small
 from .compiler.signals import call_handlers, end_of_block
 from .compiler.vector import choose, fill_like, fuse, product
 from .polhode import Polhode, Step
-from .protocol import Result, Workspace, find_ends, loosen, record
+from .protocol import Output, Result, Workspace, deliver, find_ends, record
 
 PAUSE = 2**20
 """Steps between two calls of handlers of signals."""
@@ -188,11 +188,12 @@ def march(model, coefficients, workspace):
     return Result(n_steps, n_steps, 0, None, 0.0, False)
 
 
-MODEL_END, COEFFICIENTS_END = find_ends(Model, Coefficients)
+MODEL_END, COEFFICIENTS_END, WORKSPACE_END = find_ends(Model, Coefficients)
 
 
 @entry
 def enter(*loose):
     """`march` as Python calls it (`protocol`)."""
     model, coefficients = Model(*loose[:MODEL_END]), Coefficients(*loose[MODEL_END:COEFFICIENTS_END])
-    return loosen(march(model, coefficients, Workspace(*loose[COEFFICIENTS_END:])))
+    workspace = Workspace(*loose[COEFFICIENTS_END:WORKSPACE_END])
+    return deliver(march(model, coefficients, workspace), workspace, Output(*loose[WORKSPACE_END:]))

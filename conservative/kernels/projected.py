@@ -38,7 +38,7 @@ from .fields import (
     whole,
     with_motor,
 )
-from .protocol import Result, Workspace, find_ends, loosen, record, record_supply
+from .protocol import Output, Result, Workspace, deliver, find_ends, record, record_supply
 
 FAILURE = "the step ends too far from the invariants to be projected onto them"
 """Reason that a step fails."""
@@ -283,11 +283,12 @@ def march(model, coefficients, workspace):
     return Result(n_steps, n_steps * stages, corrections, n_steps * stages, defect, False)
 
 
-MODEL_END, COEFFICIENTS_END = find_ends(Model, Coefficients)
+MODEL_END, COEFFICIENTS_END, WORKSPACE_END = find_ends(Model, Coefficients)
 
 
 @entry
 def enter(*loose):
     """`march` as Python calls it (`protocol`)."""
     model, coefficients = Model(*loose[:MODEL_END]), Coefficients(*loose[MODEL_END:COEFFICIENTS_END])
-    return loosen(march(model, coefficients, Workspace(*loose[COEFFICIENTS_END:])))
+    workspace = Workspace(*loose[COEFFICIENTS_END:WORKSPACE_END])
+    return deliver(march(model, coefficients, workspace), workspace, Output(*loose[WORKSPACE_END:]))

@@ -2,16 +2,21 @@
 
     march(model, coefficients, workspace) -> Result
 
+    deliver(result, workspace, output) -> its fields, and the number of finite samples
+
 - `model`: what moves, what acts on it and how it starts, a named tuple `Model` of the kernel's file;
 - `coefficients`: what a step is made of, its length included, a named tuple `Coefficients` of the same file;
-- `workspace`: a `Workspace`, the samples to fill and the steps after which they are taken.
+- `workspace`: a `Workspace`, the samples to fill and the steps after which they are taken;
+- `output`: an `Output`, the same samples as attitudes and rates in body axes. They are filled within the same call of machine
+  code, because a second call would take 1.2 us.
 
 Where a step can fail, the constant `FAILURE` of the file says why.
 
-Python calls `enter(*model, *coefficients, *workspace)`, which is `march` with a plain tuple for a result: numba finds the class
-of a named tuple that passes between Python and machine code by unpickling it, which costs 5 us for each; loose values cost
-nothing. Where `enter` cuts them follows from the fields (`find_ends`); a value too many or too few is an error when `enter` is
-compiled. Each file has its own: numba does not find the code of a closure over a compiled function in its cache again.
+Python calls `enter(*model, *coefficients, *workspace, *output)`, which is `march` and `deliver`, with a plain tuple for a
+result: numba finds the class of a named tuple that passes between Python and machine code by unpickling it, which costs 5 us
+for each; loose values cost nothing. Where `enter` cuts them follows from the fields (`find_ends`); a value too many or too few
+is an error when `enter` is compiled. Each file has its own: numba does not find the code of a closure over a compiled function
+in its cache again.
 
 A named tuple as an argument takes 1.1 us as well. `taylor` and `dense`, whose runs can take 1 us, therefore have `bind` instead
 of `enter`: it returns a function without model and coefficients, and passes the model as an array of its numbers.
@@ -21,8 +26,9 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from . import small
+from . import kernel, small
 from .compiler.lanes import save_columns, save_rows
+from .samples import fill
 
 
 class Workspace(NamedTuple):
@@ -38,6 +44,17 @@ class Workspace(NamedTuple):
     pause: int
     q: Any
     L: Any
+
+
+class Output(NamedTuple):
+    """Samples in body axes: `axes`, the numbers of `samples.fill`, and R_WB (n, 3, 3) and w_WB_B (n, 3), rad/s, to fill.
+
+    Arrays without samples are not filled.
+    """
+
+    axes: Any
+    R_WB: Any
+    w_WB_B: Any
 
 
 class Result(NamedTuple):
@@ -57,10 +74,10 @@ class Result(NamedTuple):
     elsewhere: bool
 
 
-def find_ends(model: type[NamedTuple], coefficients: type[NamedTuple]) -> tuple[int, int]:
-    """Return the ends of a model and its coefficients among the loose values: constants of the machine code of `enter`."""
+def find_ends(model: type[NamedTuple], coefficients: type[NamedTuple]) -> tuple[int, int, int]:
+    """Return the ends of a model, its coefficients and the workspace among the loose values: constants of the machine code."""
     end = len(model._fields)
-    return end, end + len(coefficients._fields)
+    return end, end + len(coefficients._fields), end + len(coefficients._fields) + len(Workspace._fields)
 
 
 @small
@@ -87,3 +104,14 @@ def record_supply(row, supplied, L_out):
 def loosen(result):
     """Return the fields of a result as a plain tuple."""
     return result[:]
+
+
+@kernel
+def deliver(result, workspace, output):
+    """Fill the output with the samples before a failure. Return the fields of the result and the number of finite samples."""
+    done, n_steps, every, n = result.done, workspace.n_steps, workspace.every, len(output.R_WB)
+    if done < n_steps:
+        n = min(n, 1 + done // every)
+    axes = output.axes
+    finite = fill(axes[:0], every, n_steps, workspace.q, workspace.L, axes, output.R_WB[:n], output.w_WB_B[:n])
+    return (*loosen(result), finite)

@@ -56,7 +56,7 @@ from .compiler.vector import (
 )
 from .compiler.vector import every as all_lanes
 from .fields import at_step, finite_torque, no_supply, react, step_rotor, supply, torque, whole
-from .protocol import Result, Workspace, find_ends, loosen, record, record_lanes, record_supply
+from .protocol import Output, Result, Workspace, deliver, find_ends, record, record_lanes, record_supply
 
 FAILURE = "no continuous solution"
 """Reason that a step fails."""
@@ -360,14 +360,15 @@ def march(model, coefficients, workspace):
             call_handlers()
 
 
-MODEL_END, COEFFICIENTS_END = find_ends(Model, Coefficients)
+MODEL_END, COEFFICIENTS_END, WORKSPACE_END = find_ends(Model, Coefficients)
 
 
 @entry
 def enter(*loose):
     """`march` as Python calls it (`protocol`)."""
     model, coefficients = Model(*loose[:MODEL_END]), Coefficients(*loose[MODEL_END:COEFFICIENTS_END])
-    return loosen(march(model, coefficients, Workspace(*loose[COEFFICIENTS_END:])))
+    workspace = Workspace(*loose[COEFFICIENTS_END:WORKSPACE_END])
+    return deliver(march(model, coefficients, workspace), workspace, Output(*loose[WORKSPACE_END:]))
 
 
 @kernel

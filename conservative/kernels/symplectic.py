@@ -48,7 +48,7 @@ from .compiler.signals import call_handlers, end_of_block
 from .compiler.vector import add, apply, cross, dot, fuse, invert, scale, subtract, times, turn
 from .elliptic import sine_and_cosine
 from .fields import at_time, body_torque, own, whole
-from .protocol import Result, Workspace, find_ends, loosen, record
+from .protocol import Output, Result, Workspace, deliver, find_ends, record
 from .reduced import add_momentum, turn_attitude
 
 FAILURE = "no solution for c on the branch that begins at a step of length 0, or a free rotation of more than 1,000 rad"
@@ -308,11 +308,12 @@ def march(model, coefficients, workspace):
     return Result(n_steps, n_steps * stages, corrections, None, size, False)
 
 
-MODEL_END, COEFFICIENTS_END = find_ends(Model, Coefficients)
+MODEL_END, COEFFICIENTS_END, WORKSPACE_END = find_ends(Model, Coefficients)
 
 
 @entry
 def enter(*loose):
     """`march` as Python calls it (`protocol`)."""
     model, coefficients = Model(*loose[:MODEL_END]), Coefficients(*loose[MODEL_END:COEFFICIENTS_END])
-    return loosen(march(model, coefficients, Workspace(*loose[COEFFICIENTS_END:])))
+    workspace = Workspace(*loose[COEFFICIENTS_END:WORKSPACE_END])
+    return deliver(march(model, coefficients, workspace), workspace, Output(*loose[WORKSPACE_END:]))

@@ -14,7 +14,7 @@ import numpy as np
 from . import entry, kernel, small
 from .compiler.signals import call_handlers, end_of_block
 from .compiler.vector import add, apply, cross, dot, in_body, inverse, product, scale, subtract, times
-from .protocol import Result, Workspace, find_ends, loosen, record
+from .protocol import Output, Result, Workspace, deliver, find_ends, record
 from .reduced import Model
 from .symplectic import torque
 
@@ -189,11 +189,12 @@ def march(model, coefficients, workspace):
     return Result(n_steps, n_steps, corrections, None, math.sqrt(size), False)
 
 
-MODEL_END, COEFFICIENTS_END = find_ends(Model, Coefficients)
+MODEL_END, COEFFICIENTS_END, WORKSPACE_END = find_ends(Model, Coefficients)
 
 
 @entry
 def enter(*loose):
     """`march` as Python calls it (`protocol`)."""
     model, coefficients = Model(*loose[:MODEL_END]), Coefficients(*loose[MODEL_END:COEFFICIENTS_END])
-    return loosen(march(model, coefficients, Workspace(*loose[COEFFICIENTS_END:])))
+    workspace = Workspace(*loose[COEFFICIENTS_END:WORKSPACE_END])
+    return deliver(march(model, coefficients, workspace), workspace, Output(*loose[WORKSPACE_END:]))

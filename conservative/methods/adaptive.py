@@ -176,8 +176,7 @@ def trajectory_of(scene: Scene, label: str, start: PrincipalStart, path: Walk) -
     n, good = len(path.t), path.good
     R_WB, w_WB_B = np.empty((good, 3, 3)), np.empty((good, 3))
     L = np.ascontiguousarray(path.L[:good])
-    turn = start.J_inverse, start.spin, start.R_BP
-    finite = kernels("samples").to_body_axes(path.t[:good], path.q[:good].copy(), L, *turn, R_WB, w_WB_B)
+    finite = kernels("samples").fill(path.t[:good], 1, good, path.q[:good].copy(), L, start.axes(0.0), R_WB, w_WB_B)
     failure: IntegrationFailed | None = None
     if finite < n:
         time = float(path.t[max(finite - 1, 0)])

@@ -37,7 +37,7 @@ from .search import (
     refine_until,
     step_factor,
 )
-from .trials import ASYMPTOTIC, Estimate, parts_for, presumed_smooth, trials_of
+from .trials import ASYMPTOTIC, MOST_CHOICES, Estimate, Trials, parts_for, presumed_smooth, trials_of
 
 ATTEMPTS = 12
 """Largest number of settings that are tried."""
@@ -59,13 +59,8 @@ def integrate_to_error(
     `progress` is called as `integrate` describes. Raise `BadInput` if the error needs more than `MOST_STEPS` steps.
     """
     trials = trials_of(scene, progress)
-    method, dt = find_cheapest(trials, error, t_end)
-    dt = dt if samples.at is None else divide_step(scene, method, dt)
-    tried = reach(
-        scene, method, dt, error, t_end, samples, lambda method, grid: trials.estimate(method, grid, sensitivity=True)[0]
-    )
+    tried, trajectory = choose(trials, error, t_end, samples)
     method, grid, estimated = best_of(tried)
-    _, trajectory = trials.estimate(method, grid, sensitivity=True)
     attempts = tuple((attempt.grid.dt, attempt.estimate.total) for attempt in tried)
     total, rough = estimated.total, find_rough(tried)
     if isinstance(method, Projected) and method.tolerance is not None and samples.at is not None:
@@ -79,6 +74,29 @@ def integrate_to_error(
     if trajectory.ok and not choice.reached:
         warnings.warn(AccuracyNotReached(error, total, estimated.sensitivity or 0.0, rough), stacklevel=3)
     return replace(trajectory, choice=choice)
+
+
+def choose(trials: Trials, error: float, t_end: float, samples: SampleTimes) -> tuple[list[Attempt], Trajectory | None]:
+    """Return the runs that were tried for an error, rad, up to t_end, s, and the trajectory of the best one if it was made now.
+
+    Runs that an earlier call has tried are those of its search, which depends on nothing else.
+    """
+    key, choices = (error, t_end, samples.spacing, samples.every, samples.at is None), trials.known.choices
+    if key in choices:
+        return choices[key], None
+    method, dt = find_cheapest(trials, error, t_end)
+    dt = dt if samples.at is None else divide_step(trials.scene, method, dt)
+
+    def estimate(method: Method, grid: Grid) -> Estimate:
+        return trials.estimate(method, grid, sensitivity=True)[0]
+
+    tried = reach(trials.scene, method, dt, error, t_end, samples, estimate)
+    best = best_of(tried)
+    _, trajectory = trials.estimate(best.method, best.grid, sensitivity=True)
+    if len(choices) >= MOST_CHOICES:
+        choices.clear()
+    choices[key] = tried
+    return tried, trajectory
 
 
 Estimating = Callable[[Method, Grid], Estimate]

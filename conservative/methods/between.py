@@ -185,7 +185,7 @@ def move(
             moved = moved if good == len(lead) else min(moved, int(some[of >= good].min()))
         waiting = waiting[left[waiting] > 0]
     moved_R, moved_w = np.empty((moved, 3, 3)), np.empty((moved, 3))
-    kernels("samples").to_body_axes(times, q, L, start.J_inverse, None, start.R_BP, moved_R, moved_w)
+    kernels("samples").fill(times, 1, moved, q, L, start.axes(0.0), moved_R, moved_w)
     R[far[:moved]], w[far[:moved]] = moved_R, moved_w / units.time
     if supplied is not None:
         supplied[far] += L[:, 3:] * units.supply

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..attitude import Array
+from ..deferred_imports import kernels
 from ..grid import ROUNDING, Grid
 
 MOST_PARTS = 64
@@ -107,8 +108,28 @@ def march_pieces(
     pause: int,
     q: Array,
     L: Array,
+    axes: Array,
+    R_WB: Array,
+    w_WB_B: Array,
+) -> tuple[int, int, int, int | None, float, bool, int]:
+    """Take the steps of all pieces as `enter` of a kernel takes the steps of a run, and fill the samples."""
+    result = _march(pieces, kernel, model, find_coefficients, grid, pause, q, L)
+    n = grid.count_samples(result[0])
+    return (*result, kernels("samples").fill(grid.t[:n], 1, n, q, L, axes, R_WB[:n], w_WB_B[:n]))
+
+
+def _march(
+    pieces: Sequence[Piece],
+    kernel: Any,
+    model: Any,
+    find_coefficients: Callable[[float], Any],
+    grid: Grid,
+    pause: int,
+    q: Array,
+    L: Array,
 ) -> tuple[int, int, int, int | None, float, bool]:
-    """Take the steps of all pieces as `enter` of a kernel takes the steps of a run, and fill the samples q and L."""
+    """Take the steps of all pieces, and fill the samples q and L."""
+    nothing = np.zeros(kernels("samples").END), np.empty((0, 3, 3)), np.empty((0, 3))
     state, supplied, ends = (model.q, model.L), np.zeros(4), (np.empty((2, 4)), np.empty((2, 7)))
     stages, corrections, evaluations, size = 0, 0, None, 0.0
     q[0], L[0, :3], L[0, 3:] = model.q, model.L, 0.0
@@ -119,7 +140,7 @@ def march_pieces(
         to_q, to_L = (samples[rows.start - 1 : rows.stop] for samples in (q, L)) if several else ends
         every = n // len(rows) if several else n
         # The fields of `Result`: steps done, stages, corrections, evaluations, size, elsewhere.
-        result = kernel.enter(*start, *find_coefficients(h), n, every, pause, to_q, to_L)
+        result = kernel.enter(*start, *find_coefficients(h), n, every, pause, to_q, to_L, *nothing)
         stages, corrections, size = stages + result[1], corrections + result[2], result[4]
         evaluations = None if result[3] is None else (evaluations or 0) + result[3]
         to_L[: 1 + result[0] // every, 3:] += supplied

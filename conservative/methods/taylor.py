@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 from ..batch import Batch
@@ -15,15 +16,16 @@ from ..grid import Grid
 from ..invariants import AXIAL_MOMENTUM, JACOBI_INTEGRAL, MOMENTA
 from ..method import Method, Role, Run
 from ..method_info import Cost, MethodInfo, Structure
-from ..potentials.turning import Orbit, Turning, static_part
+from ..potentials.turning import Turning, static_part
 from ..scene import Scene
-from ..trajectory import Bounds, Trajectory
+from ..trajectory import Bounds
 from .bounds import within_round_off
 from .many import RunMany
-from .run_kernel import KernelRun, prepare_run
+from .run_kernel import prepare_run
 from .taylor_dense import prepare_dense
 from .taylor_lanes import prepare_bodies
 from .taylor_model import find_model
+from .taylor_starts import bind_restart
 from .units import in_own_units
 
 LOWEST, DEFAULT, HIGHEST = 4, 14, 18
@@ -135,25 +137,13 @@ class Taylor(Method):
         label, (start, model) = self.label, scene.derive(find_model, self.tolerance is None)
         if self.tolerance is None:
             kernel = kernels("taylor")
-            run = prepare_run(scene, grid, label, start, kernel, model, kernel.Coefficients(self.terms, grid.dt))
-        else:
-            run = prepare_dense(scene, grid, label, start, model, self.terms, self.tolerance)
-        return turn_samples(run, scene.potential.orbit) if isinstance(scene.potential, Turning) else run
+            coefficients = kernel.Coefficients(self.terms, grid.dt)
+            bind = partial(bind_restart, scene, start, model, None)
+            return prepare_run(scene, grid, label, start, kernel, model, coefficients, bind_restart=bind)
+        return prepare_dense(scene, grid, label, start, model, self.terms, self.tolerance)
 
     def prepare_many(self, bodies: Batch, grid: Grid) -> RunMany | None:
         return prepare_bodies(bodies, grid, self.terms) if self.tolerance is None else None
-
-
-def turn_samples(run: KernelRun, orbit: Orbit) -> KernelRun:
-    """Return a run whose attitudes are turned from the axes of an orbit to the world's."""
-
-    def run_and_turn() -> Trajectory:
-        trajectory = run()
-        return replace(trajectory, R_WB=orbit.R_WO(trajectory.t) @ trajectory.R_WB)
-
-    turned = KernelRun(run_and_turn)
-    turned.own_loop = run.own_loop
-    return turned
 
 
 def find_obstacle(scene: Scene) -> str | None:

@@ -6,6 +6,7 @@ With equal steps a free body, and a symmetric top in gravity away from the verti
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,8 @@ def find_model(scene: Scene, reduced: bool) -> tuple[PrincipalStart, Any]:
     # Where body and field share an axis of symmetry, the frame does not spin, and the third component of L must not change.
     symmetric = scene.symmetry_axis_B is not None
     start, loose = principal_start(scene, "non_spinning" if symmetric else "body"), (1.0, 1.0, 0.0 if symmetric else 1.0)
+    if isinstance(scene.potential, Turning):
+        start = replace(start, orbit=scene.potential.orbit)
     rotor = start.rotor or ()
     kernel, R_WD, momentum = kernels("taylor"), axes_of(scene), math.hypot(*(np.add(start.L, rotor) if rotor else start.L))
     free = not (field_axis(scene) or isinstance(scene.potential, Turning))
@@ -40,11 +43,16 @@ def find_model(scene: Scene, reduced: bool) -> tuple[PrincipalStart, Any]:
     reduction = None
     if reduced and free and momentum > 0 and not rotor:
         reduction = reduce_free(start, R_DP)
-    elif reduced and isinstance(start.field, UniformField) and loose[2] == 0:
+    elif reduced and is_reducible(start):
         reduction = reduce_top(start, R_DP)
     field, *rows = reduction or (kernel.Free(momentum) if free else start.field, triple(R_DP[2]), triple(R_DP[0]))
     body = start.J, start.J_inverse, field, loose, invariant_scales(scene)
     return start, kernel.Model(*body, quadruple(R_WD), *rows, start.q, start.L, rotor)
+
+
+def is_reducible(start: PrincipalStart) -> bool:
+    """Return whether the motion is that of a symmetric top in gravity, which is reduced away from the vertical."""
+    return isinstance(start.field, UniformField) and start.spin is not None
 
 
 def reduce_free(start: PrincipalStart, R_DP: Array) -> tuple[Any, ...]:

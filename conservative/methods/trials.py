@@ -63,8 +63,8 @@ NOISE = 4.0
 random bodies are larger than the estimate, and at most 2.6 times as large; 23 % and 4.2 times without this."""
 ASYMPTOTIC = 0.2
 """Errors above this, rad, are saturated (angles end at pi) and are not used."""
-MOST_SCENES, MOST_ESTIMATES = 64, 1024
-"""Largest numbers of scenes whose trial runs are cached, and of cached trial runs of each."""
+MOST_SCENES, MOST_ESTIMATES, MOST_CHOICES = 64, 1024, 64
+"""Largest numbers of scenes whose trial runs are cached, and of cached trial runs and choices of each."""
 ROUNDED = float(np.finfo(float).eps)
 """Relative change of a scene's numbers that represents rounding."""
 NOTHING = 1e-13
@@ -118,7 +118,18 @@ class Estimate:
         return self.error + self.noise
 
 
-Known = dict[tuple[Method, Grid], Estimate]
+class Known(dict[tuple[Method, Grid], Estimate]):
+    """Estimates of runs of a scene, and in `choices` the results of searches (`automatic`), by what they are for."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.choices: dict[Any, Any] = {}
+
+    def clear(self) -> None:
+        super().clear()
+        self.choices.clear()
+
+
 Observe = Callable[[Method, Grid], None]
 
 
@@ -172,14 +183,14 @@ def trials_of(scene: Scene, progress: Callable[[Progress], object] | None = None
 
     Nothing is cached for a scene that cannot be followed (`Scene.key`).
     """
-    estimates = {} if (identity := scene.identity).unknown else recall(identity.text)
+    estimates = Known() if (identity := scene.identity).unknown else recall(identity.text)
     return Trials(scene, estimates, (lambda method, grid: None) if progress is None else throttle(progress))
 
 
 @lru_cache(maxsize=MOST_SCENES)
 def recall(key: str) -> Known:
     """Return the estimates for scenes with a key (`Scene.key`): the same dictionary each time."""
-    return {}
+    return Known()
 
 
 def throttle(progress: Callable[[Progress], object], clock: Callable[[], float] = monotonic) -> Observe:

@@ -142,7 +142,13 @@ def in_own_units(prepare: Prepare[AnyMethod]) -> Prepare[AnyMethod]:
             return prepare(method, scene, grid)
         steps = Grid(grid.dt / units.time, grid.n_steps, grid.every)
         run = prepare(method, scene.derive(convert_scene, units), steps)
-        restored = KernelRun(lambda: units.restore(run(), scene, grid))
+
+        def run_and_restore(R_WB0: Any = None, w_WB_B0: Any = None) -> Trajectory:
+            if R_WB0 is not None or w_WB_B0 is not None:
+                return restored.from_start(R_WB0, w_WB_B0)
+            return units.restore(run(), scene, grid)
+
+        restored = KernelRun(run_and_restore)
         restored.own_loop = getattr(run, "own_loop", run)
         return restored
 

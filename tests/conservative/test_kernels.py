@@ -19,7 +19,7 @@ import conservative as cv
 from conservative import kernels as all_kernels
 from conservative.deferred_imports import kernels
 from conservative.kernels import digest
-from conservative.kernels.protocol import Result, Workspace
+from conservative.kernels.protocol import Output, Result, Workspace
 from conservative.registry import list_families
 
 from ..environments import run_python
@@ -132,10 +132,10 @@ def test_processes_that_share_a_cache_compile_each_kernel_once(tmp_path: Path, s
 
 QUARTER_TURN = """
 import numpy as np
-from conservative.kernels.samples import to_body_axes
-R, w, one = np.empty((1, 3, 3)), np.empty((1, 3)), (1.0, 1.0, 1.0)
-to_body_axes(np.ones(1), np.eye(1, 4), np.zeros((1, 3)), one, (np.pi / 2, 1.0), None, R, w)
-print(round(R[0, 1, 0]), sum(to_body_axes.stats.cache_hits.values()))
+from conservative.kernels.samples import fill, gather_axes
+R, w, axes = np.empty((1, 3, 3)), np.empty((1, 3)), gather_axes((1.0, 1.0, 1.0), (np.pi / 2, 1.0), None)
+fill(np.ones(1), 1, 1, np.eye(1, 4), np.zeros((1, 3)), axes, R, w)
+print(round(R[0, 1, 0]), sum(fill.stats.cache_hits.values()))
 """
 
 
@@ -193,15 +193,16 @@ def plain_enter(module: ModuleType) -> Any:
 def test_a_kernel_takes_loose_values_by_the_fields_of_its_tuples(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     module, result, handed = kernels(name), Result(1, 2, 3, None, 0.5, False), []
     monkeypatch.setattr(module, "march", lambda *parts: handed.append(parts) or result)
-    parts = named(module.Model), named(module.Coefficients), named(Workspace)
+    monkeypatch.setattr(module, "deliver", lambda result, *parts: handed.append(parts) or (*result, 4))
+    parts = named(module.Model), named(module.Coefficients), named(Workspace), named(Output)
     loose = [value for part in parts for value in part]
     found = plain_enter(module)(*loose)
     assert type(found) is tuple
-    assert found == result
-    assert handed == [parts]
-    assert [type(part) for part in handed[0]] == [type(part) for part in parts]
+    assert found == (*result, 4)
+    assert handed == [parts[:3], parts[2:]]
+    assert [type(part) for part in (*handed[0], handed[1][1])] == [type(part) for part in parts]
     for wrong in (loose[:-1], [*loose, 0]):
-        with pytest.raises(TypeError, match="Workspace"):
+        with pytest.raises(TypeError, match="Output"):
             plain_enter(module)(*wrong)
 
 

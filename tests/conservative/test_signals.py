@@ -238,10 +238,9 @@ def test_handlers_are_asked_for_every_so_often_in_the_main_thread_alone(name: st
     class Kernel:
         PAUSE, FAILURE, pauses = kernels(name).PAUSE, "", []
 
-        def enter(self, n_steps: int, every: int, pause: int, q: np.ndarray, L: np.ndarray) -> tuple[object, ...]:
+        def enter(self, n_steps: int, every: int, pause: int, *arrays: np.ndarray) -> tuple[object, ...]:
             self.pauses.append(pause)
-            q[:], L[:] = 1.0, 1.0
-            return n_steps, n_steps, 0, None, 0.0, False
+            return n_steps, n_steps, 0, None, 0.0, False, len(arrays[-1])
 
     scene, kernel = cv.scenes.brick_flip(), Kernel()
     run = prepare_run(scene, Grid(0.1, 3), "label", principal_start(scene), kernel, (), ())

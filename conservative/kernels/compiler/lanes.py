@@ -285,6 +285,26 @@ def gather_numbers(values):
     return np.array(numbers, dtype=float), like
 
 
+MOST_MODELS = 64
+"""Largest number of values in the cache of a function that `cache_by_identity` extends."""
+
+
+def cache_by_identity(build):
+    """Cache a function of a tuple by its identity: runs of a scene share their model, and comparing its numbers takes long."""
+    built = {}
+
+    @wraps(build)
+    def recall(value):
+        held = built.get(id(value))
+        if held is None or held[0] is not value:
+            if len(built) >= MOST_MODELS:
+                built.clear()
+            held = built[id(value)] = value, build(value)
+        return held[1]
+
+    return recall
+
+
 def cache_by_types(build):
     """Cache a function of the tuple that `gather_numbers` returns.
 
