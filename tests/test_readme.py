@@ -310,3 +310,30 @@ def test_the_page_follows_the_counts_and_intervals(of_bodies):
     assert "heyoka was faster in none of 22 cases (one body at one error)." in text
     assert "11 are undecided." in text
     assert program.render_bodies().startswith("| error, rad | spring |\n| --- | --- |\n| 1e-3 | 1.39")
+
+
+@pytest.mark.parametrize("factor", [1, 0.25])
+def test_readme_names_a_field_in_which_heyoka_is_faster(factor, tmp_path, monkeypatch):
+    """The rows about compiled loops alone show that the others are about calls."""
+    program = load("measured")
+    rows = program.read_csv(program.ROWS)
+    for each in rows:
+        if each["name"] == program.TYPED and each["scene"].startswith("gradient "):
+            each["value"] = str(factor * float(each["value"]))
+    loops = [each | {"name": program.TYPED + program.LOOPS} for each in rows if each["name"] == program.TYPED]
+    with (tmp_path / "measured.csv").open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, rows[0])
+        writer.writeheader()
+        writer.writerows([*rows, *loops])
+    monkeypatch.setattr(program, "ROWS", tmp_path / "measured.csv")
+    text = " ".join(program.render_page().split())
+    assert "both sides deliver attitude and rates" in text
+    lost = re.findall(r"\* In ([^*]*), heyoka is ([\d.]+) to ([\d.]+) times as fast as `Taylor`", text)
+    values, *_ = program.read_values()
+    means = [
+        value for (place, *key), value in values.items() if key == [program.TYPED, program.RATIO] and place[:9] == "gradient "
+    ]
+    ends = [pytest.approx(1 / max(means), rel=0.06), pytest.approx(1 / min(means), rel=0.06)]
+    assert [(field, float(low), float(high)) for field, low, high in lost] == (
+        [] if factor == 1 else [(program.FIELDS["gradient"], *ends)]
+    )

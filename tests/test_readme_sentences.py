@@ -183,13 +183,22 @@ def typed(rows):
     name = rows.program.TYPED
     tolerances = sorted({float(each.split()[-1]) for each in rows.of(name)})
     single = [min(rows.of(name, ", smallest").values()), max(rows.of(name, ", largest").values())]
-    return [tolerances[-1], tolerances[0], *ends(rows, name), *map(Near, single)]
+    bodies = rows.program.same_tolerance(rows.value).bodies
+    return [tolerances[-1], tolerances[0], *ends(rows, name), bodies, *map(Near, single)]
 
 
 def same(rows):
     """Return the tolerances, the ratios of the fields in which `Taylor` is faster, and its ratio on the worst body."""
     found = rows.program.same_tolerance(rows.value)
-    return [1e-3, 1e-12, *map(Near, found.means), Near(found.worst)]
+    return [1e-3, 1e-12, *map(Near, found.means), found.bodies, Near(found.worst)]
+
+
+def lost_in(field):
+    def check(rows):
+        found = rows.program.same_tolerance(rows.value)
+        return [*map(Near, dict(found.lost)[rows.program.FIELDS[field]])]
+
+    return check
 
 
 def once(rows):
@@ -257,6 +266,11 @@ CLAIMS = {
         Up(rows.value["brick_flip", "MuJoCo", each]) for each in ("drift of momentum", "error")
     ],
     "At the same tolerance": same,
+    r"\* In gravity, heyoka is": lost_in("gravity"),
+    r"\* In a spring, heyoka is": lost_in("spring"),
+    r"\* In a point attraction, heyoka is": lost_in("attraction"),
+    r"\* In a turning gravity gradient, as of a satellite, heyoka is": lost_in("gradient"),
+    r"\* In a fixed gravity gradient, heyoka is": lost_in("fixed_gradient"),
     r"\* On the steady top, heyoka is": lambda rows: rows.slower("lagrange_top", "closed form")[:1],
     r"\* heyoka is [\d.]+ times as fast as our general": faster_place,
     r"\* heyoka is cheaper for a single run": once,
@@ -271,7 +285,7 @@ CLAIMS = {
     r"\* At the same error": lambda rows: ends(rows, rows.program.BODIES),
     "The factors are geometric means for motions of": of_bodies,
     "Our closed forms do not solve these": cases,
-    "These are 100 bodies": never_lost,
+    r"These are \d+ bodies": never_lost,
     "Single bodies differ from the mean": lambda rows: [
         Near(rows.bodies("smallest ratio")),
         Near(rows.bodies("largest ratio")),

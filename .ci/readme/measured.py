@@ -37,8 +37,8 @@ LABELS = {
     "closed form": "closed form: `{}`",
 }
 """Methods of README's table: a name with its version, or with the class of the closed form of the scene."""
-CALLED = "typed tolerance, calls"
-"""Name of the rows at typed tolerances in which both sides deliver attitude and rates; those of `TYPED` time compiled code."""
+LOOPS = ", compiled loops"
+"""End of the names of rows about compiled loops alone. If there are none, rows without it are about compiled loops, too."""
 FIELDS = {
     "gravity": "gravity",
     "spring": "a spring",
@@ -112,8 +112,8 @@ class SameTolerance:
 
     Attributes
     ----------
-    called
-        True if calls are timed that deliver attitude and rates on both sides; False if compiled code is.
+    called, bodies
+        Whether calls are timed that deliver attitude and rates on both sides, not compiled code alone; bodies in each field.
     won, means, worst
         The fields in which `Taylor` is faster at all tolerances, with the smallest and the largest ratio of a field, and the
         smallest ratio of a body.
@@ -122,6 +122,7 @@ class SameTolerance:
     """
 
     called: bool
+    bodies: int
     won: str
     means: list[float]
     worst: float
@@ -130,20 +131,20 @@ class SameTolerance:
 
 def same_tolerance(values: Values) -> SameTolerance:
     """Return the comparison of calls at the same tolerance, or of compiled code if calls were not measured."""
-    called = any(key[1:] == (CALLED, RATIO) for key in values)
-    name = CALLED if called else TYPED
+    called = any(key[1:] == (TYPED + LOOPS, RATIO) for key in values)
+    bodies = int(values.get(("all fields", TYPED, "bodies"), 50)) // len(FIELDS)
     means: dict[str, list[float]] = {field: [] for field in FIELDS}
     worst: dict[str, list[float]] = {field: [] for field in FIELDS}
     for (place, *key), value in values.items():
         for found, quantity in ((means, RATIO), (worst, f"{RATIO}, smallest")):
-            if key == [name, quantity] and (field := place.split()[0]) in FIELDS:
+            if key == [TYPED, quantity] and (field := place.split()[0]) in FIELDS:
                 found[field].append(value)
     won = [field for field in FIELDS if min(means[field]) > 1]
     every = [mean for field in won for mean in means[field]]
     lost = [(what, [1 / max(means[field]), 1 / min(means[field])]) for field, what in FIELDS.items() if field not in won]
     names = [FIELDS[field] for field in won]
     won_in = " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
-    return SameTolerance(called, won_in, [min(every), max(every)], min(min(worst[field]) for field in won), lost)
+    return SameTolerance(called, bodies, won_in, [min(every), max(every)], min(min(worst[field]) for field in won), lost)
 
 
 def scene_table(values: Values, versions: dict[str, str]) -> str:
