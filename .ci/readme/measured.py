@@ -33,7 +33,7 @@ LABELS = {
     "SciPy": "SciPy {}, DOP853",
     "heyoka": "heyoka {}",
     "reduced": "Krenk & Nielsen: `Reduced`",
-    "ours": "`Taylor`",
+    "ours": "`Taylor(order=12)`",
     "closed form": "closed form: `{}`",
 }
 """Methods of README's table: a name with its version, or with the class of the closed form of the scene."""
