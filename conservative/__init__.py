@@ -1,4 +1,4 @@
-"""Conservative integration of rigid-body rotation.
+"""Validation and conservative integration of rigid-body rotation.
 
     import conservative as cv
 

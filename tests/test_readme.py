@@ -20,6 +20,7 @@ from .pages import ROOT, pages
 from .reports.rows import row
 
 FOLDER = ROOT / ".ci" / "readme"
+ENTRANTS = "conservative/entrants.md"
 
 
 @pytest.fixture(autouse=True)
@@ -119,7 +120,7 @@ def test_a_changed_measurement_makes_it_stale(tmp_path, monkeypatch):
     fields[3] = str(3 * float(fields[3]))
     (tmp_path / "measured.csv").write_text(text.replace(line, ",".join(fields)), encoding="utf-8")
     monkeypatch.setattr(program, "ROWS", tmp_path / "measured.csv")
-    assert program.render_readme() != (ROOT / "README.md").read_text(encoding="utf-8")
+    assert program.render_page() != (ROOT / "README.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(
@@ -334,8 +335,10 @@ def of_bodies(tmp_path, monkeypatch):
 )
 def test_the_counts_of_cases_add_up(bodies, of_bodies):
     program = of_bodies(bodies)
-    (sentence,) = re.findall(r"Of these 22\s.*?\.(?=\n)", program.render_readme(), re.DOTALL)
-    assert ("neither side" in sentence) == (bodies[1] == (None, None))
+    text = " ".join(program.render_page(ENTRANTS).split())
+    assert f"heyoka was faster in {11 if bodies[1] == (3e-6, 1e-6) else 'none'} of 22 cases" in text
+    assert ("In 11, neither reached the error." in text) == (bodies[1] == (None, None))
+    assert ("11 are undecided." in text) == (bodies[1] == (1e-6, 1.04e-6))
     values, *_ = program.read_values()
     counts = [int(values["all fields", program.BODIES, f"cases {which}"]) for which in ("won", "lost", "open")]
     assert counts == {None: [11, 0, 0], 1e-6: [11, 0, 11], 3e-6: [11, 11, 0]}[bodies[1][0]]
@@ -344,8 +347,35 @@ def test_the_counts_of_cases_add_up(bodies, of_bodies):
 
 def test_the_page_follows_the_counts_and_intervals(of_bodies):
     program = of_bodies([(1e-6, 2e-6), (1e-6, 1.04e-6)])
-    text = " ".join(program.render_readme().split())
+    text = " ".join(program.render_page(ENTRANTS).split())
     assert re.search(r"by factors between 1\.4 \([\d.]+ to [\d.]+\) and 1\.4 \(", text)
-    assert "Of these 22 cases (one body at one error), heyoka wins none," in text
-    assert "none, 11 are undecided" in text
+    assert "heyoka was faster in none of 22 cases (one body at one error)." in text
+    assert "11 are undecided." in text
     assert program.render_bodies().startswith("| error, rad | spring |\n| --- | --- |\n| 1e-3 | 1.39")
+
+
+@pytest.mark.parametrize("factor", [1, 0.25])
+def test_readme_names_a_field_in_which_heyoka_is_faster(factor, tmp_path, monkeypatch):
+    """The rows about compiled loops alone show that the others are about calls."""
+    program = load("measured")
+    rows = program.read_csv(program.ROWS)
+    for each in rows:
+        if each["name"] == program.TYPED and each["scene"].startswith("gradient "):
+            each["value"] = str(factor * float(each["value"]))
+    loops = [each | {"name": program.TYPED + program.LOOPS} for each in rows if each["name"] == program.TYPED]
+    with (tmp_path / "measured.csv").open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, rows[0])
+        writer.writeheader()
+        writer.writerows([*rows, *loops])
+    monkeypatch.setattr(program, "ROWS", tmp_path / "measured.csv")
+    text = " ".join(program.render_page().split())
+    assert "both sides deliver attitude and rates" in text
+    lost = re.findall(r"\* In ([^*]*), heyoka is ([\d.]+) to ([\d.]+) times as fast as `Taylor`", text)
+    values, *_ = program.read_values()
+    means = [
+        value for (place, *key), value in values.items() if key == [program.TYPED, program.RATIO] and place[:9] == "gradient "
+    ]
+    ends = [pytest.approx(1 / max(means), rel=0.06), pytest.approx(1 / min(means), rel=0.06)]
+    assert [(field, float(low), float(high)) for field, low, high in lost] == (
+        [] if factor == 1 else [(program.FIELDS["gradient"], *ends)]
+    )

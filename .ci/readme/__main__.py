@@ -1,4 +1,6 @@
-"""Write README.md, and the generated parts of other pages: tables of times, of what the code declares, and counts of CSV files.
+"""Write README.md, conservative/entrants.md and the generated parts of other pages.
+
+These are tables of times, tables of what the code declares, and counts of CSV files.
 The motions in the tests of references/motions are generated, too.
 
     python .ci/readme                 # write them
@@ -77,7 +79,9 @@ def main(root: Path = ROOT) -> None:
     if options.folder or options.chosen or options.price:
         measure_again(options.folder, options.chosen, options.price)
     pages = read_pages(root)
-    new = {page: fill(text, PARTS) for page, text in pages.items()} | {root / "README.md": measured.render_readme()}
+    new = {page: fill(text, PARTS) for page, text in pages.items()} | {
+        root / page: measured.render_page(page) for page in measured.PAGES
+    }
     new |= {page: declared.embed_motions(page.name, text) for page, text in pages.items() if page.name in declared.MOTION_TESTS}
     changed = [page for page in pages if new[page] != pages[page]]
     missing = {*PARTS} - {name for text in pages.values() for name in names(text)}

@@ -1,30 +1,63 @@
-"""README.md and the tables of times, from measured.csv and README.md.j2, which are beside this file."""
+"""README.md, the page of our entrants and the tables of times, from measured.csv and the templates beside this file."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 import jinja2
+import numpy as np
 from pages import read_csv, table
 
-from conservative.reports.document.cells import angle, bound, tolerance
+import conservative as cv
+from conservative import registry
+from conservative.reports.document.cells import DASH, angle, bound, tolerance
+from conservative.scene import Scene
 
 HERE = Path(__file__).resolve().parent
 ROWS = HERE / "measured.csv"
 PICTURE, CHOSEN, BODIES, TYPED, MANY = "picture", "chosen method", "random bodies", "typed tolerance", "many bodies"
 """Names or scenes of rows that belong to one part of measured.csv."""
-LOOPS = ", compiled loops"
-"""End of the names of rows of random bodies about compiled loops alone."""
 SINGLE = "single bodies"
 CALLS = "time of a call, "
 """Beginning of the names of rows about what a call adds to a compiled loop; the kind of the call follows."""
 RATIO, GENERAL = "heyoka's time over ours", "our general integrators"
+SCENES = {
+    "brick_flip": "brick, free rotation",
+    "lagrange_top": "top, steady precession",
+    "nutating_top": "top, nutating",
+}
+"""Scenes of README's table, and what they are."""
+LABELS = {
+    "MuJoCo, Euler": "MuJoCo {}, Euler",
+    "MuJoCo": "MuJoCo {}, RK4",
+    "Pinocchio": "Pinocchio {}, RK4",
+    "SciPy": "SciPy {}, DOP853",
+    "heyoka": "heyoka {}",
+    "reduced": "Krenk & Nielsen: `Reduced`",
+    "ours": "`Taylor(order=12)`",
+    "closed form": "closed form: `{}`",
+}
+"""Methods of README's table: a name with its version, or with the class of the closed form of the scene."""
+LOOPS = ", compiled loops"
+"""End of the names of rows about compiled loops alone. If there are none, rows without it are about compiled loops, too."""
+FIELDS = {
+    "gravity": "gravity",
+    "spring": "a spring",
+    "attraction": "a point attraction",
+    "gradient": "a turning gravity gradient, as of a satellite",
+    "fixed_gradient": "a fixed gravity gradient",
+}
+"""Fields of random bodies, and what they are."""
+PAGES = {"README.md": "README.md.j2", "conservative/entrants.md": "entrants.md.j2"}
+"""Pages that are made from templates."""
 KEPT = (("brick_flip", "energy"), ("brick_flip", "momentum"), ("lagrange_top", "energy"), ("lagrange_top", "vertical momentum"))
 """Quantities that the map of the paper conserves."""
 SHOWN = ("1e-3", "1e-6", "1e-9", "1e-12")
 """Errors and tolerances that pages show; measured.csv has all decades."""
+CLOSED_FORMS = (cv.MoserVeselov(), cv.Lame())
 Values = dict[tuple[str, str, str], float]
 """Values by scene, name and quantity."""
 
@@ -46,12 +79,16 @@ def interval(values: Values, *place: str) -> list[float]:
     return [values[*place, f"{RATIO}{end}"] for end in ("", ", low", ", high")]
 
 
-def render_readme() -> str:
-    """Return the text of README.md."""
+def render_page(page: str = "README.md") -> str:
+    """Return the text of one of `PAGES`."""
     values, versions, date = read_values()
     environment = jinja2.Environment(keep_trailing_newline=True, undefined=jinja2.StrictUndefined)
     environment.filters |= {"two_digits": two_digits, "small": small, "angle": angle, "bound": bound, "ratio": ratio_text}
-    return environment.from_string((HERE / "README.md.j2").read_text(encoding="utf-8")).render(
+    environment.filters |= {"numbers": numbers}
+    return environment.from_string((HERE / PAGES[page]).read_text(encoding="utf-8")).render(
+        results=scene_table(values, versions),
+        same=same_tolerance(values),
+        measured=lambda *key: key in values,
         value=lambda *key: values[key],
         interval=lambda *place: interval(values, *place),
         ratios=sorted(interval(values, *key[:2]) for key in values if key[1:] == (BODIES, RATIO)),
@@ -73,6 +110,77 @@ def render_readme() -> str:
         version=versions,
         date=date,
     )
+
+
+@dataclass(frozen=True)
+class SameTolerance:
+    """How fast `Taylor` is at the same tolerance as heyoka.
+
+    Attributes
+    ----------
+    called, bodies
+        Whether calls are timed that deliver attitude and rates on both sides, not compiled code alone; bodies in each field.
+    won, means, worst
+        The fields in which `Taylor` is faster at all tolerances, with the smallest and the largest ratio of a field, and the
+        smallest ratio of a body.
+    lost
+        The other fields, each with the smallest and the largest ratio of our time to heyoka's.
+    """
+
+    called: bool
+    bodies: int
+    won: str
+    means: list[float]
+    worst: float
+    lost: list[tuple[str, list[float]]]
+
+
+def same_tolerance(values: Values) -> SameTolerance:
+    """Return the comparison of calls at the same tolerance, or of compiled code if calls were not measured."""
+    called = any(key[1:] == (TYPED + LOOPS, RATIO) for key in values)
+    bodies = int(values.get(("all fields", TYPED, "bodies"), 50)) // len(FIELDS)
+    means: dict[str, list[float]] = {field: [] for field in FIELDS}
+    worst: dict[str, list[float]] = {field: [] for field in FIELDS}
+    for (place, *key), value in values.items():
+        for found, quantity in ((means, RATIO), (worst, f"{RATIO}, smallest")):
+            if key == [TYPED, quantity] and (field := place.split()[0]) in FIELDS:
+                found[field].append(value)
+    won = [field for field in FIELDS if min(means[field]) > 1]
+    every = [mean for field in won for mean in means[field]]
+    lost = [(what, [1 / max(means[field]), 1 / min(means[field])]) for field, what in FIELDS.items() if field not in won]
+    names = [FIELDS[field] for field in won]
+    won_in = " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
+    return SameTolerance(called, bodies, won_in, [min(every), max(every)], min(min(worst[field]) for field in won), lost)
+
+
+def scene_table(values: Values, versions: dict[str, str]) -> str:
+    """Return README's table: a group of rows for each scene, the smallest attitude error first."""
+    lines = []
+    for name, what in SCENES.items():
+        scene = registry.scene(name)
+        angle_of_step = two_digits(float(np.linalg.norm(scene.w_WB_B0)) * scene.dt)
+        end, step = two_digits(scene.t_end), f"{scene.dt:g} s ({angle_of_step} rad)"
+        lines.append([f"**{what}**, {end} s, steps of {step}", *[""] * 6])
+        entrants = sorted(LABELS, key=lambda entrant: values[name, entrant, "error"])
+        lines += [_entrant_row(values, versions, scene, entrant) for entrant in entrants]
+    return table(["", "energy", "momentum", "axial momentum", "error, rad", "order", "time, µs"], lines)
+
+
+def _entrant_row(values: Values, versions: dict[str, str], scene: Scene, name: str) -> list[str]:
+    """Return drifts, error, order and time of a method on a scene."""
+    closed = next(type(method).__name__ for method in CLOSED_FORMS if method.unsupported(scene) is None)
+    label = LABELS[name].format(closed if name == "closed form" else versions.get(name, ""))
+    drifts = [values[scene.name, name, f"drift of {invariant.name}"] for invariant in scene.invariants]
+    error, order = values[scene.name, name, "error"], values.get((scene.name, name, "order"), math.nan)
+    shown = [small(drift) if math.isfinite(drift) else DASH for drift in drifts]
+    time = values.get((scene.name, name, "time"))
+    return [
+        label,
+        *[*shown, DASH][:3],
+        angle(error) if math.isfinite(error) else "diverges",
+        DASH if math.isnan(order) else f"{order:.1f}",
+        "not timed" if time is None else two_digits(time),
+    ]
 
 
 def count_unreached(values: Values) -> int:
@@ -202,6 +310,11 @@ def ratio_text(ratio: list[float], digits: int = 3) -> str:
     """Return a ratio with its interval, such as `2.67 (2.59 to 2.75)`."""
     mean, low, high = (f"{each:#.{digits}g}".removesuffix(".") for each in ratio)
     return f"{mean} ({low} to {high})"
+
+
+def numbers(values: list[float]) -> str:
+    """Return numbers to two digits, such as `1.7 to 2.6`."""
+    return " to ".join(f"{value:#.2g}".removesuffix(".") for value in values)
 
 
 def two_digits(value: float) -> str:

@@ -19,37 +19,47 @@ from conservative.errors import AccuracyNotReached
 from conservative.integration.one import integrate
 from conservative.invariants import sizes
 from conservative.method import Role
+from conservative.outcome import OutcomeKind
 from conservative.reports.document.cells import tolerance
+from conservative.reports.rows import lines
 from conservative.reports.rows.names import MethodClass, of_classes, with_names
 from conservative.reports.rows.points import front, points
 from conservative.reports.sections import many_bodies
+from conservative.reports.sections.hard_cases import USABLE
 from conservative.reports.sections.random_bodies import ANY, pooled, ratios, typed_points, typed_ratios
 from conservative.reports.sections.scene_ratios import each_step
 
 COLUMNS = ("scene", "name", "quantity", "value", "unit", "method", "version", "command", "date")
-CLOSED_FORMS = {"brick_flip": "moser_veselov", "lagrange_top": "lame"}
+CLOSED_FORMS = {"brick_flip": "moser_veselov", "lagrange_top": "lame", "nutating_top": "lame"}
+"""README's scenes, and our closed form of each."""
 GENERAL = "taylor:order=12"
 """Our integrator for any body in README's table."""
 ENGINES = {"heyoka": "heyoka", "SciPy": "scipy:loop=compiled", "MuJoCo": "mujoco", "Pinocchio": "pinocchio"}
 """The methods of the drifts and errors; times are those of the fastest setting of a family."""
+EULER = "MuJoCo, Euler"
+"""MuJoCo's default integrator."""
+SINGLE = {"reduced": "reduced", EULER: "mujoco:integrator=Euler"}
+"""Methods whose own times are shown, not those of the fastest setting of a family."""
 FAMILIES = {name: method.partition(":")[0] for name, method in ENGINES.items()}
 ERROR = 1e-6
 """Attitude error at which times are compared, rad."""
 MOVING = {
-    **{"MuJoCo, default": "mujoco:integrator=Euler", "MuJoCo, RK4": "mujoco", "PyBullet": "pybullet"},
+    "MuJoCo, default": "mujoco:integrator=Euler",
+    "MuJoCo, RK4": "mujoco",
     "reduced": "reduced",
 }
-"""The motions of README's first picture, and the most accurate setting of an engine in it."""
+"""The motions of README's picture."""
 SEED = 1005
 """Seed of the random bodies, fixed before the run and never used before."""
 METHODS = "--methods taylor,projected,moser_veselov,lame,heyoka,scipy,mujoco,pinocchio"
-LONGER = "brick_flip:t_end=24,brick_flip:t_end=96,lagrange_top:t_end=2,lagrange_top:t_end=8"
+LONGER = "brick_flip:t_end=24,brick_flip:t_end=96,lagrange_top:t_end=2,lagrange_top:t_end=8,nutating_top:t_end=8"
 COMMANDS = {
-    "accuracy": "conservative study paper --scenes brick_flip,lagrange_top"
+    "accuracy": f"conservative study paper --scenes {','.join(CLOSED_FORMS)}"
     " --methods reduced,taylor,moser_veselov,lame,heyoka,scipy,mujoco,pinocchio",
-    "moving": "conservative study motion --scenes brick_flip --methods mujoco,pybullet,reduced",
+    "orders": f"conservative study convergence --scenes {','.join(CLOSED_FORMS)} --methods reduced,taylor,mujoco,pinocchio",
+    "moving": "conservative study motion --scenes brick_flip --methods mujoco,reduced",
     "report": "conservative report",
-    "times": f"conservative study work_precision --scenes brick_flip,lagrange_top,asymmetric_top {METHODS}",
+    "times": f"conservative study work_precision --scenes {','.join(CLOSED_FORMS)},asymmetric_top {METHODS},reduced",
     "longer": f"conservative study work_precision --scenes {LONGER} --methods taylor,projected,moser_veselov,lame,heyoka",
     "random": f"conservative study random --bodies 20 --seed {SEED} --methods gauss,projected,taylor,heyoka",
     "each_step": "conservative study each_step"
@@ -120,17 +130,33 @@ def read(path: Path) -> pd.DataFrame:
     return pd.read_csv(path, dtype=texts).fillna(dict.fromkeys(texts, ""))
 
 
+def methods_on(scene: str) -> dict[str, str]:
+    """Return the methods of README's table on a scene, by the names of their rows."""
+    return {"ours": GENERAL, "closed form": CLOSED_FORMS[scene], **ENGINES, **SINGLE}
+
+
 def accuracy_rows(table: pd.DataFrame) -> Iterator[Row]:
-    """Yield drifts and errors on the paper's two scenes at the scene's step."""
-    for scene, closed in CLOSED_FORMS.items():
+    """Yield drifts and errors on README's scenes at the scene's step."""
+    for scene in CLOSED_FORMS:
         here = table[table["scene"] == scene]
         here = here[here["dt"] == here["dt"].max()]
-        for name, method in {"ours": GENERAL, "closed form": closed, **ENGINES, "reduced": "reduced"}.items():
+        for name, method in methods_on(scene).items():
             yield from ({"scene": scene, "name": name} | row for row in run_rows(here[here["method"] == method]))
 
 
+def order_rows(table: pd.DataFrame) -> Iterator[Row]:
+    """Yield the observed orders on README's scenes, if the fit is certain and an error of the method is small."""
+    for scene in CLOSED_FORMS:
+        here = table[table["scene"] == scene]
+        orders = lines.orders(here)
+        smallest = here[here["measure"] == Measure.ATTITUDE_MAX.text].groupby("method")["value"].min()
+        for name, method in methods_on(scene).items():
+            if not math.isnan(order := orders.get(method, math.nan)) and smallest[method] < USABLE:
+                yield {"scene": scene, "name": name, "quantity": "order", "value": order, "unit": "1", "method": method}
+
+
 def moving_rows(table: pd.DataFrame) -> Iterator[Row]:
-    """Yield drifts and errors of the methods of README's first picture, and of MuJoCo's other setting."""
+    """Yield drifts, errors and steps of the motions of README's picture."""
     for name, method in MOVING.items():
         run, place = table[table["method"] == method], {"scene": "picture", "name": name}
         yield from (place | row for row in run_rows(run))
@@ -138,12 +164,17 @@ def moving_rows(table: pd.DataFrame) -> Iterator[Row]:
         yield place | about | {"value": run["dt"].iloc[0]}
 
 
+def infinite(row: Any) -> float:
+    """Return the value of a row, infinite if its run diverged."""
+    return math.inf if row["outcome"] == OutcomeKind.DIVERGED else float(row["value"])
+
+
 def run_rows(run: pd.DataFrame) -> Iterator[Row]:
     """Yield the drift of each invariant, and the error, of one run."""
     common = {"version": run["version"].iloc[0], "method": run["method"].iloc[0]}
     for _, drift in run[run["measure"] == Measure.DRIFT_MAX.text].iterrows():
-        yield common | {"quantity": f"drift of {drift['quantity']}", "unit": "1", "value": drift["value"]}
-    error = run[run["measure"] == Measure.ATTITUDE_MAX.text]["value"].iloc[0]
+        yield common | {"quantity": f"drift of {drift['quantity']}", "unit": "1", "value": infinite(drift)}
+    error = infinite(run[run["measure"] == Measure.ATTITUDE_MAX.text].iloc[0])
     yield common | {"quantity": "error", "unit": "rad", "value": error}
 
 
@@ -169,7 +200,8 @@ def time_rows(table: pd.DataFrame) -> Iterator[Row]:
     """Yield the times of README's scenes and of the table of three scenes, and heyoka's times over ours."""
     timed = points(with_names(table))
     for scene in CLOSED_FORMS:
-        yield from readme_rows(timed, scene)
+        if scene in set(timed["scene"]):
+            yield from readme_rows(timed, scene)
     yield from scene_rows(timed)
 
 
@@ -194,6 +226,9 @@ def readme_rows(timed: pd.DataFrame, scene: str) -> Iterator[Row]:
 
     for name, family in families.items():
         yield common | {"name": name} | time_of(fastest(scene, family))
+    own = costs(timed[(timed["scene"] == scene) & timed["method"].isin(SINGLE.values())], [ERROR], ["method"])
+    for name, method in SINGLE.items():
+        yield common | {"name": name} | time_of(cheapest(own[own["method"] == method].assign(name=method)))
     durations = [each for each in reached["scene"].unique() if each.partition(":")[0] == scene]
     for name in ("ours", "closed form"):
         speed_ratios = [SpeedRatio(each, ERROR, fastest(each, families[name]), fastest(each, "heyoka")) for each in durations]
@@ -337,6 +372,7 @@ def call_kind(series: str) -> str | None:
 
 MAKERS = {
     ("accuracy",): accuracy_rows,
+    ("orders",): order_rows,
     ("moving",): moving_rows,
     ("times", "longer"): time_rows,
     ("random",): random_rows,

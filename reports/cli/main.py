@@ -97,7 +97,7 @@ conservative --help                              all commands"""
 @click.version_option(package_name="conservative-rotation", message="%(prog)s %(version)s")
 @click.pass_context
 def main(context: click.Context) -> None:
-    """Integrate the rotation of rigid bodies, and measure and verify integrators and physics engines.
+    """Measure, verify and gate the rotation of rigid bodies in integrators, engines, programs and recordings.
 
     Tab completion in bash: eval "$(_CONSERVATIVE_COMPLETE=bash_source conservative)". In zsh and fish: zsh_source, fish_source.
     """

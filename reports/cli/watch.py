@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     epilog=epilog(
         "conservative watch brick_flip -m mujoco:Euler,reduced,exact",
         "conservative watch lagrange_top -m mujoco:RK4,taylor --dt 0.01 --out top.html",
-        "conservative watch brick_flip -m mujoco:Euler,pybullet,reduced,exact --out brick.gif",
+        "conservative watch brick_flip -m mujoco:Euler,mujoco:RK4,reduced,exact --out brick.gif",
         "conservative watch brick_flip -m reduced,exact --out brick.png      the last frame",
     ),
 )

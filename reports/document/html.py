@@ -11,7 +11,7 @@ import gzip
 import json
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
 
@@ -20,7 +20,7 @@ from markupsafe import Markup, escape
 
 from .. import animation
 from . import contrast
-from .model import AT_FIRST, Cell, Document, Motion, Section, Style, Table, walk
+from .model import AT_FIRST, Block, Cell, Document, Motion, Section, Style, Table, walk
 
 LONGEST_PACKED = 600_000
 """Largest length of the packed measurements in a page, characters; longer ones are only in measurements.csv."""
@@ -35,7 +35,7 @@ def render(document: Document) -> str:
     environment.filters |= {"whole": _whole, "narrow": _narrow, "place": _place}
     environment.filters |= {"cell": _cell, "order": _order, "numeric_columns": _numeric_columns, "motion": motion}
     blocks = list(walk(document.blocks))
-    linked = [block for block in document.blocks if isinstance(block, Section) and block.anchor]
+    linked = [block for block in _outer(document.blocks) if isinstance(block, Section) and block.anchor]
     scripts: dict[str, str] = {}
     if charts := {figure.name: list(figure.panels) for figure in document.figures if figure.panels}:
         # Some colours have too little contrast on a light or a dark page and are replaced there.
@@ -56,6 +56,15 @@ def render(document: Document) -> str:
     template = environment.get_template("page.html.j2")
     shown = {"document": document, "linked": linked, "scripts": scripts, "player": player}
     return re.sub(r"\n{2,}", "\n", template.render(shown, has_rows=has_rows, at_first=AT_FIRST)) + "\n"
+
+
+def _outer(blocks: Iterable[Block]) -> Iterator[Block]:
+    """Yield the outer blocks of a document. A folded section without an anchor is no block of its own, but those in it are."""
+    for block in blocks:
+        if isinstance(block, Section) and block.folded and not block.anchor:
+            yield from block.blocks
+        else:
+            yield block
 
 
 def pack(text: str) -> str:

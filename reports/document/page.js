@@ -138,5 +138,14 @@
     grid.addEventListener("click", showText);
   }
 
+  // A link into a folded part opens it.
+  const reveal = () => {
+    const goal = document.getElementById(location.hash.slice(1));
+    for (let e = goal; e; e = e.parentElement) if (e.localName === "details") e.open = true;
+    goal?.scrollIntoView();
+  };
+  addEventListener("hashchange", reveal);
+  if (location.hash) reveal();
+
   drawAll(night.matches);
 })();

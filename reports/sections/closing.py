@@ -9,23 +9,37 @@ from dataclasses import dataclass
 import pandas as pd
 
 from conservative.benchmarks.measures.measure import Measure
-from conservative.benchmarks.speed_ratio import costs
+from conservative.benchmarks.speed_ratio import cheapest, costs
 from conservative.benchmarks.studies import convergence, paper, speed
 from conservative.method import Role
 from conservative.outcome import Outcome
 from conservative.scene import Scene
 
 from ..document.cells import DASH, angle, bound, factor, number, outcome_cell, tolerance
-from ..document.model import Row, Table
+from ..document.model import Grade, Row, Table
 from ..rows import lines
-from ..rows.names import ABSENT, at_own_step, display_name, largest_drifts, of_measure, of_study, outcomes, without_outcome
+from ..rows.names import (
+    ABSENT,
+    MethodClass,
+    at_own_step,
+    display_name,
+    largest_drifts,
+    of_classes,
+    of_measure,
+    of_study,
+    outcomes,
+    without_outcome,
+)
+from .measured import Measured
 from .summary import MIDDLE
 
 HEADER = ("attitude", "order", "µs/step", f"µs at {tolerance(MIDDLE)}")
+PAPER_MAP = "reduced"
+"""The integrator of the paper, which a report always shows."""
 LEGEND = (
-    "energy, momenta: largest relative drift; attitude: largest error, rad; all at the scene's own step, or at the default "
-    f"tolerance, and rounded up. order: measured order of convergence, standard error at most {lines.SURE:g}. µs at "
-    f"{tolerance(MIDDLE)}: wall time per simulated second at this attitude error, rad. {DASH}: not measurable, or not reached."
+    "energy, momenta: largest relative drift; attitude: largest error, rad; at the scene's own step or the default tolerance, "
+    f"rounded up. order: observed. µs at {tolerance(MIDDLE)}: wall time per simulated second at this error, rad. "
+    f"{DASH}: not measurable, or not reached."
 )
 
 
@@ -83,23 +97,45 @@ def scene_lines(table: pd.DataFrame, points: pd.DataFrame, scene: Scene, named: 
         )
 
 
-def scene_table(table: pd.DataFrame, points: pd.DataFrame, scene: Scene, named: bool = False) -> Table:
+def scene_table(table: pd.DataFrame, points: pd.DataFrame, scene: Scene, named: bool = False, reason: bool = True) -> Table:
     """Return one row per line of `scene_lines`, and a column for each invariant of the scene.
 
-    Methods that failed come last, with the reason; settings of a method that failed in the same way share a row.
+    Methods that failed come last, with the reason if `reason`; settings of a method that failed in the same way share a row.
     """
+
+    def why(outcome: Outcome) -> str:
+        return str(outcome_cell(outcome, reason=True)) if reason else Grade.BAD.mark(outcome.kind)
+
     body: list[Row] = []
     failed: dict[tuple[str, str], list[str]] = {}
     for line in scene_lines(table, points, scene, named):
         if not line.outcome.ok:
-            failed.setdefault((line.family, str(outcome_cell(line.outcome, reason=True))), []).append(line.name)
+            failed.setdefault((line.family, why(line.outcome)), []).append(line.name)
             continue
         order, step = _order(line), number(line.time_per_step * 1e6)
         body.append([line.name, *map(bound, line.drifts.values()), angle(line.error), order, step, factor(line.reached * 1e6)])
     header = ["method", *(invariant.name for invariant in scene.invariants), *HEADER]
     # In the first cell, because a terminal has no room for a column of reasons.
-    body += [[f"{', '.join(names)}: {reason}", *[DASH] * (len(header) - 1)] for (_, reason), names in failed.items()]
+    body += [[f"{', '.join(names)}: {text}", *[DASH] * (len(header) - 1)] for (_, text), names in failed.items()]
     return Table(header, body, scene.name)
+
+
+def brief_table(measured: Measured, points: pd.DataFrame, scene: Scene) -> Table:
+    """Return the table of a scene for a terminal. The page has all methods.
+
+    It has all settings of engines, the fastest setting of each ODE solver, the paper's map, and the fastest of our methods of
+    each kind. If methods were named, it has all of them.
+    """
+    if measured.plan.named:
+        return scene_table(measured.scene_rows, points, scene, named=True)
+    rows, reached = measured.scene_rows, costs(points, [MIDDLE])
+    solvers = of_classes(points, MethodClass.SOLVER)
+    kinds = [of_classes(reached, kind) for kind in (MethodClass.GENERAL, MethodClass.SOLUTION)]
+    kinds += [solver for _, solver in of_classes(reached, MethodClass.SOLVER).groupby("family")]
+    fastest = points[points["name"].isin([side.name for side in map(cheapest, kinds) if side])]
+    slower = solvers[solvers["family"].isin(fastest["family"]) & ~solvers["series"].isin(fastest["series"])]
+    of_engines = (rows["role"] == Role.ENGINE) & ~rows["series"].isin(slower["series"])
+    return scene_table(rows[of_engines | rows["series"].isin([PAPER_MAP, *fastest["series"]])], points, scene, reason=False)
 
 
 def paper_table(table: pd.DataFrame, points: Mapping[str, pd.DataFrame], scenes: Iterable[Scene]) -> Table:

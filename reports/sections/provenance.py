@@ -24,7 +24,7 @@ def section(measured: Measured, details: Sequence[Block]) -> Section:
     text = (
         f"{kind}A time is the shortest of several rounds, in which methods take turns. The method's own loop is timed, "
         f"final state only, in {timing}.{resumed} Errors are relative to a reference solution that an independent one "
-        "confirms. All tables are below, behind a click."
+        "confirms."
     )
     facts = [("command", f"`{source.command}`"), ("date", source.date), ("commit", source.commit)]
     facts += [("machine", ", ".join(f"{name} {value}" for name, value in source.machine.items())), ("python", source.python)]
@@ -35,6 +35,11 @@ def section(measured: Measured, details: Sequence[Block]) -> Section:
     methods = Section("Methods of this package", [Facts(list(about.items()))] if about else [], folded=True)
     blocks = filled(Paragraph(text), versions, *details, methods, others, locks)
     return Section("How it was measured", blocks, "made", "Measured")
+
+
+def repeat(measured: Measured) -> Paragraph:
+    """Return the command that makes the report again."""
+    return Paragraph(f"Repeat with: `{measured.source.command}`")
 
 
 def lock_sections(locks: Sequence[LockedEngine]) -> list[Section]:

@@ -358,7 +358,7 @@ def sentence(ratios: Iterable[RandomRatios]) -> str:
     else:
         parts.append(f"single bodies: {factor(pooled.worst)} to {factor(pooled.best)}")
     if pooled.open:
-        parts.append(f"{pooled.open} are open")
+        parts.append(f"{pooled.open} undecided")
     if missed := len(pooled.speed_ratios) - len(pooled.both):
         parts.append(f"{missed} more are not reached by both")
     bodies = "one random body" if len(pooled.both) == 1 else f"{len(pooled.both)} random bodies"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
 from typing import Any, TypeVar
@@ -40,11 +40,14 @@ from .measured import Measured, of_scene
 T = TypeVar("T")
 SECTIONS: dict[str, Any] = {module.STUDY.name: module for module in (many_bodies, long_time)}
 """Sections of the rows and samples of one study, by its name."""
+EVERYTHING = "Everything else: the motion, speed, drift, what to use, how it was measured, and all tables"
+"""Title of the part behind the click."""
 
 
 def build(plan: Plan, measurements: Measurements, source: Provenance) -> Document:
     """Return the document of measurements. Every number that a report shows is computed here; nothing is measured.
 
+    The page shows a table, two charts and the command that repeats them. Everything else is folded.
     A section that cannot be made is a sentence (see `attempt`), and a failure of the document.
     """
     measured = Measured(plan, measurements, source)
@@ -93,19 +96,26 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
         details.append(paper)
         paper = None
     folded = [replace(detail, folded=True) if isinstance(detail, Section) else detail for detail in details]
-    blocks: list[Block] = [
-        part("motion", lambda: tumbling.section(measured, results())),
-        part("speed", lambda: speed.section(measured, summaries())),
+    drawn = cache(lambda: speed.pictures(measured, summaries()))
+    everything: list[Block] = [
+        part("the motion", lambda: tumbling.motion_section(measured, results())),
+        part("speed", lambda: speed.section(measured, drawn())),
         part("drift", lambda: drift.section(measured, results())),
         part("advice", lambda: advice.section(measured)),
     ]
     origin = part("provenance", lambda: provenance.section(measured, folded))
-    blocks += [origin] if isinstance(origin, Section) else [origin, *folded]
+    everything += [origin] if isinstance(origin, Section) else [origin, *folded]
+    blocks: list[Block] = [
+        part("results", lambda: tumbling.section(measured, results())),
+        part("charts", lambda: speed.first_figure(drawn())),
+        provenance.repeat(measured),
+        Section(EVERYTHING, everything, folded=True),
+    ]
     return Document(
         "conservative report",
-        "conservative: which integrator for a rotating body?",
+        "conservative: how wrong is the rotation of a rigid body?",
         blocks,
-        brief=list(brief(measured, points, summaries)),
+        brief=list(brief(measured, points, results)),
         data=measurements.content(source),
         failures=failures.failures_of_ours(rows),
         pages=pages,
@@ -114,16 +124,14 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
 
 
 def brief(
-    measured: Measured, points: Mapping[str, pd.DataFrame], summaries: Callable[[], Mapping[str, summary.Summary]]
+    measured: Measured, points: Mapping[str, pd.DataFrame], results: Callable[[], Sequence[tumbling.Result]]
 ) -> Iterator[Block]:
-    """Yield the lines for the terminal: a table of each scene, and sentences."""
+    """Yield the lines for the terminal: a table of each scene with few of our methods, and sentences."""
     for scene in measured.plan.scenes:
-        table = partial(closing.scene_table, measured.scene_rows, points[scene.name], scene, bool(measured.plan.named))
-        yield attempt(f"The table of {scene.name}", table)
+        yield attempt(f"The table of {scene.name}", partial(closing.brief_table, measured, points[scene.name], scene))
     yield Paragraph(f"{closing.LEGEND}\n")
     tables = attempt("The tables of engines", lambda: engines.tables(measured))
     yield from [tables] if isinstance(tables, Paragraph) else tables
     if measured.ratios:
         yield attempt("The sentence on random bodies", lambda: Paragraph(random_bodies.sentence(measured.ratios)))
-    sentences = attempt("The summary", lambda: [Paragraph(scene_summary.sentence) for scene_summary in summaries().values()])
-    yield from [sentences] if isinstance(sentences, Paragraph) else sentences
+    yield attempt("The summary", lambda: Paragraph(tumbling.sentence(results(), measured.main_scene)))

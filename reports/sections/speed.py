@@ -1,4 +1,7 @@
-"""The second screen of a report: computing time against attitude error, a line for each family, on every kind of motion."""
+"""Computing time against attitude error, a line for each family, on every kind of motion.
+
+Two motions are on the first screen of a report, the others behind a click.
+"""
 
 from __future__ import annotations
 
@@ -20,29 +23,53 @@ from . import random_bodies
 from .measured import Measured, of_scene
 from .summary import CAVEAT, MIDDLE, Summary
 
+FIRST = 2
+"""Number of motions whose charts are on the first screen."""
+HEIGHT = 230
+"""Height of a chart, pixels."""
 
-def section(measured: Measured, of_scenes: Mapping[str, Summary]) -> Section:
-    """Return the section, from the summary of each scene; random bodies are included if the report has them."""
-    pictures = {f"{scene.name} ({scene.group})": of_scenes[scene.name].points for scene in measured.plan.scenes}
+
+def pictures(measured: Measured, of_scenes: Mapping[str, Summary]) -> dict[str, pd.DataFrame]:
+    """Return the points of each motion by its title: the main scene, random bodies if the report has them, other scenes."""
+    motions = {f"{scene.name} ({scene.group})": of_scenes[scene.name].points for scene in measured.plan.scenes}
+    main = f"{measured.main_scene.name} ({measured.main_scene.group})"
+    first = {main: motions.pop(main)}
+    if measured.ratios:
+        study, fields = _drawn(measured)
+        title = f"{len(study.scenes)} random bodies in {len(fields)} fields (geometric mean)"
+        first[title] = random_bodies.summary(measured.rows, measured.ratios).points
+    return first | motions
+
+
+def _drawn(measured: Measured) -> tuple[Any, list[str]]:
+    """Return the study of random bodies, and its fields."""
+    study = next(study for study in measured.plan.studies if study.drawn)
+    return study, list(dict.fromkeys(body.field for body in study.drawn))
+
+
+def first_figure(pictures: Mapping[str, pd.DataFrame]) -> Figure:
+    """Return the charts of the first two motions."""
+    return figure(dict(list(pictures.items())[:FIRST]), "time_against_error")
+
+
+def section(measured: Measured, pictures: Mapping[str, pd.DataFrame]) -> Section:
+    """Return the section behind the click: what the charts show, and those of the other motions."""
     main = measured.main_scene.name
     sentence = _sentence(main, costs(of_scene(measured.points, main), [MIDDLE]))
     random = "Random bodies are not in this report; `conservative report --bodies 3` adds them."
     if measured.ratios:
-        study = next(study for study in measured.plan.studies if study.drawn)
-        fields = list(dict.fromkeys(body.field for body in study.drawn))
-        title = f"{len(study.scenes)} random bodies in {len(fields)} fields (geometric mean)"
-        pictures[title] = random_bodies.summary(measured.rows, measured.ratios).points
-        sentence += " " + _sentence(f"{len(study.scenes)} random bodies", pictures[title])
+        study, fields = _drawn(measured)
+        points = next(points for title, points in pictures.items() if "random bodies" in title)
+        sentence += " " + _sentence(f"{len(study.scenes)} random bodies", points)
         random = f"Random bodies: {measured.plan.bodies} in each field ({', '.join(fields)}), with {len(study.lines)} methods."
         random += " `conservative report --bodies N` measures N in each of five fields, with all methods."
     rough = f" {random_bodies.ROUGH}" if all(study.processes == 1 for study in measured.plan.studies) else ""
-    lead = Paragraph(sentence, Emphasis.LEAD) if sentence else None
-    chart = attempt("The chart of time against error", lambda: figure(pictures))
-    blocks = filled(
-        lead,
-        chart,
-        Paragraph(f"{random} {CAVEAT}{rough}", Emphasis.NOTE),
+    others = dict(list(pictures.items())[FIRST:])
+    chart = (
+        attempt("The chart of time against error of the other motions", lambda: figure(others, "others")) if others else None
     )
+    lead = Paragraph(sentence, Emphasis.LEAD) if sentence else None
+    blocks = filled(lead, chart, Paragraph(f"{random} {CAVEAT}{rough}", Emphasis.NOTE))
     return Section("How wrong, how fast", blocks, "speed", "Speed")
 
 
@@ -61,7 +88,7 @@ def _sentence(subject: str, points: pd.DataFrame) -> str:
     return f"At an attitude error of {tolerance(MIDDLE)} rad on {subject}, {ours.name} is {', and '.join(parts)}."
 
 
-def figure(pictures: Mapping[str, pd.DataFrame]) -> Figure:
+def figure(pictures: Mapping[str, pd.DataFrame], name: str) -> Figure:
     """Return time against error, a panel for each motion; the legend lists the other families behind a button."""
     full = {motion: points for motion, points in pictures.items() if len(points)}
     curves = joined(full.values())
@@ -73,7 +100,7 @@ def figure(pictures: Mapping[str, pd.DataFrame]) -> Figure:
     panels = []
     for motion, points in full.items():
         fields = ("name", "setting", "error", "microseconds", *(["within"] if points["within"].any() else ["sample", "dt"]))
-        (panel,) = vega_embed.embed(figures.best_of_families(points), fields, 400)
+        (panel,) = vega_embed.embed(figures.best_of_families(points), fields, HEIGHT)
         panels.append(panel | {"usermeta": {"name": motion}})
     same = dict.fromkeys(
         sentence
@@ -81,9 +108,9 @@ def figure(pictures: Mapping[str, pd.DataFrame]) -> Figure:
         for sentence in under(((str(name), line) for name, line in points.groupby("name", sort=False)), "error", "time")
     )
     return Figure(
-        "time_against_error",
+        name,
         "Computing time against attitude error, each method at its fastest settings",
-        " ".join(["Lower left is better: faster and more accurate. Ours: solid, ODE solvers: dashed, engines: dotted.", *same]),
+        " ".join(["Lower left is better. Ours: solid, ODE solvers: dashed, engines: dotted.", *same]),
         panels=panels,
         legend=legend,
         layout=Layout.PANELS,

@@ -1,4 +1,7 @@
-"""The first screen of a report: one motion in the exact solution, in engines and in our methods, and how wrong each is."""
+"""One motion in the exact solution, in engines and in our methods, and how wrong each is.
+
+The table is on the first screen of a report, the animation behind a click.
+"""
 
 from __future__ import annotations
 
@@ -22,13 +25,13 @@ from ..document.cells import DASH, angle, bound, grade, listed, numeric, outcome
 from ..document.model import Block, Cell, Emphasis, Motion, Paragraph, Row, Section, Table, filled
 from ..rows import lines
 from ..rows.names import MethodClass, largest_drifts, of_classes, of_measure, of_study, outcomes
+from .closing import PAPER_MAP
 from .hard_cases import RIGHT, USABLE
 from .measured import Measured, of_scene
 from .summary import MIDDLE
 
 STUDIES = tuple(module.STUDY.name for module in (motion, convergence, speed))
 """Studies of the section."""
-PAPER_MAP = "reduced"
 MOST = 8
 """Largest number of motions next to each other, with the exact one."""
 
@@ -88,14 +91,20 @@ def drawn(results: Sequence[Result]) -> list[str]:
 
 
 def section(measured: Measured, results: Sequence[Result]) -> Section:
-    """Return the section, from the `results`."""
+    """Return the first section of a report, from the `results`."""
     scene = measured.main_scene
     subject = "a tumbling brick" if scene.name == "brick_flip" else scene.name
+    blocks = filled(Paragraph(sentence(results, scene), Emphasis.LEAD), table(results, scene))
+    return Section(f"What happens to {subject}", blocks, "results", "Results", source={"study": STUDIES, "scene": scene.name})
+
+
+def motion_section(measured: Measured, results: Sequence[Result]) -> Section:
+    """Return the section with the animation, and the explanation of the table of the first section."""
+    scene = measured.main_scene
     moving = attempt(f"The animation of {scene.name}", lambda: animation(measured, scene, results))
-    lead = Paragraph(_sentence(results, scene), Emphasis.LEAD)
-    blocks = filled(lead, *([moving] if isinstance(moving, Paragraph) else moving), table(results, scene))
-    source = {"study": STUDIES, "scene": scene.name}
-    return Section(f"What happens to {subject}", blocks, "motion", "Motion", source=source)
+    explained = Paragraph(explanation(results, scene))
+    blocks = filled(*([moving] if isinstance(moving, Paragraph) else moving), explained)
+    return Section("The motion, and what the first table means", blocks, "motion", "Motion")
 
 
 def animation(measured: Measured, scene: Scene, results: Sequence[Result]) -> list[Block]:
@@ -115,7 +124,7 @@ def animation(measured: Measured, scene: Scene, results: Sequence[Result]) -> li
     return [motion, Paragraph(signs, Emphasis.NOTE)]
 
 
-def _sentence(results: Sequence[Result], scene: Scene) -> str:
+def sentence(results: Sequence[Result], scene: Scene) -> str:
     """Return the largest error and change of energy, and the errors at both ends of what is compared.
 
     They belong to this engine, to the most accurate engine, and to our methods, each at its worst and at its best setting.
@@ -148,7 +157,7 @@ def _sentence(results: Sequence[Result], scene: Scene) -> str:
 def table(results: Sequence[Result], scene: Scene) -> Table:
     """Return the results as a table with grades."""
     header = ["method", "step, s", *(f"drift of {invariant.name}" for invariant in scene.invariants)]
-    header += [f"attitude error, rad (✓ to {tolerance(RIGHT)}, ✗ above {USABLE:g})", "order", "µs per step"]
+    header += ["attitude error, rad", "order", "µs per step"]
     rows: list[Row] = []
     failed: dict[tuple[str, str], list[Result]] = {}
     for result in results:
@@ -162,17 +171,24 @@ def table(results: Sequence[Result], scene: Scene) -> Table:
     for alike in failed.values():  # settings that failed in the same way share a row
         names, reason = ", ".join(result.name for result in alike), outcome_cell(alike[0].outcome, reason=True)
         rows.append([names, DASH, reason, *[DASH] * (len(header) - 3)])
+    when = f"at the engine's default step, or {scene.dt:g} s if it has none"
+    caption = f"Largest errors and relative drifts in {scene.t_end:.3g} s, rounded up, {when}."
+    return Table(header, rows, caption)
+
+
+def explanation(results: Sequence[Result], scene: Scene) -> str:
+    """Return what the marks and the columns of the table mean, and what its motion is."""
     moments, rate = ", ".join(f"{moment:.3g}" for moment in scene.body.moments), np.linalg.norm(scene.w_WB_B0)
-    caption = f"Largest values over {scene.t_end:.3g} s, rounded up. Drifts are relative: ✓ to {tolerance(CONSERVED)}, "
-    caption += f"✗ above {tolerance(SMALL)}. Moments of inertia: {moments} kg m²; initial rate: {rate:.3g} rad/s. "
-    caption += f"Step: the engine's default, or {scene.dt:g} s if it has none."
+    parts = [f"Moments of inertia: {moments} kg m²; initial rate: {rate:.3g} rad/s."]
+    parts.append(f"A drift is marked ✓ to {tolerance(CONSERVED)} and ✗ above {tolerance(SMALL)}.")
+    parts.append(f"An attitude error is marked ✓ to {tolerance(RIGHT)} rad and ✗ above {USABLE:g} rad.")
     if scene.loaded:
-        caption += " A balance counts work and impulse as the method sums them, or as the reference solution does."
+        parts.append("A balance counts work and impulse as the method sums them, or as the reference solution does.")
     if ours := list(dict.fromkeys(result.family for result in results if result.ours)):
-        caption += f" Ours: {listed(ours)}."
+        parts.append(f"Ours: {listed(ours)}.")
     kept = [result for result in results if result.drifts and all(drift <= CONSERVED for drift in result.drifts.values())]
     if still := [result.line for result in kept if result.error > RIGHT]:
         names = listed([invariant.name for invariant in scene.invariants])
-        caption += f" Conservation is not accuracy: {still[0]} conserves {names}, and its attitude is wrong."
-    caption += f" Order: the error falls as step^order, down to round-off ({DASH}: adaptive steps, or an uncertain fit)."
-    return Table(header, rows, caption)
+        parts.append(f"Conservation is not accuracy: {still[0]} conserves {names}, and its attitude is wrong.")
+    parts.append(f"Order: the error falls as step^order, down to round-off ({DASH}: adaptive steps, or an uncertain fit).")
+    return " ".join(parts)

@@ -263,13 +263,13 @@ def test_watch_writes_the_last_frame_and_replaces_its_own(tmp_path):
 def test_the_picture_of_the_readme_is_below_a_megabyte_and_shows_four_motions():
     file = ROOT / "reports" / "pictures" / "brick_flip.gif"
     assert MARK.encode() in file.read_bytes()[:HEAD]
-    assert file.stat().st_size < 1e6  # 872 kB
+    assert file.stat().st_size < 1e6  # 796 kB
     images = read_frames(file)
     last = [counts(part) for part in np.split(images[-1][: video.SIDE], 4, axis=1)]
     shown = [[each.get(colour, 0) for colour in FACES] for each in last]
-    assert np.abs(np.subtract(shown[2], shown[3])).sum() < 0.3 * sum(shown[3])  # the paper's map, below the outline
-    for engine in shown[:2]:  # measured 0.65 and 0.9
-        assert np.abs(np.subtract(engine, shown[3])).sum() > 0.5 * sum(shown[3])
+    euler, rk4, paper_map = (np.abs(np.subtract(each, shown[3])).sum() / sum(shown[3]) for each in shown[:3])
+    assert euler > 0.5  # measured 0.62
+    assert rk4 < paper_map < 0.3  # measured 0.04 and 0.07: of the outline
 
 
 def test_all_numbers_are_in_the_picture_of_a_free_flight(tmp_path):

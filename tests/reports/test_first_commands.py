@@ -1,4 +1,4 @@
-"""The commands of README's block "On the command line": they end well, and the motions that they show are right."""
+"""The commands that the page of the commands begins with: they end well, and the motions that they show are right."""
 
 import csv
 import json
@@ -23,7 +23,8 @@ from ..independent import Case, angle_between, motion
 from ..pages import ROOT, shell_lines
 from ..sampling import sampled
 
-BLOCK = (ROOT / "README.md").read_text(encoding="utf-8").partition("## On the command line")[2].partition("## Read on")[0]
+PAGE = (ROOT / "reports" / "README.md").read_text(encoding="utf-8")
+BLOCK = PAGE.partition("## Commands\n")[2].partition("On other pages")[0]
 COMMANDS = {
     " ".join(words[1:3] if words[1] in ("engines", "verify") else words[1:2]): words[1:] for words in shell_lines(BLOCK)
 }
@@ -108,20 +109,20 @@ def verify(shown):
 
 CHECKS = {"new": new, "run": run, "watch": watch, "sweep": sweep, "verify run.csv": verify, "verify my_body.urdf": verify}
 CHECKS |= {"engines add": add, "recommend": recommend, "verify my_engine": verify}
-ELSEWHERE = {"engines install", "gate"}
-"""The first is below, the second in `test_versions`, where a package with two commits is."""
+ELSEWHERE = {"engines install", "gate", "list", "track", "report", "study", "motions"}
+"""The first is below, the others in tests of their own."""
 
 
 def test_every_command_of_the_block_is_checked():
     assert set(COMMANDS) == set(CHECKS) | ELSEWHERE
-    assert len(COMMANDS) == 11
+    assert len(COMMANDS) == 16
 
 
 DEFAULT = ["run", "watch", "verify run.csv", "verify my_body.urdf", "engines add"]
 
 
 @pytest.mark.parametrize("name", sampled(CHECKS, len(DEFAULT), DEFAULT))
-def test_a_command_of_readme_ends_well_and_shows_a_right_motion(name, folder):
+def test_a_command_ends_well_and_shows_a_right_motion(name, folder):
     if name == "verify run.csv":
         invoke(*COMMANDS["run"])
     shutil.copy(ROOT / "references/model_files/models/fixed_child.urdf", "my_body.urdf")
@@ -133,7 +134,7 @@ def test_a_command_of_readme_ends_well_and_shows_a_right_motion(name, folder):
     CHECKS[name](invoke(*COMMANDS[name]))
 
 
-def test_the_engines_of_readme_are_installed(monkeypatch):
+def test_the_engines_of_the_page_are_installed(monkeypatch):
     """Without a network: their names are known, and each gets to the installation."""
 
     def made(name, *options):

@@ -76,8 +76,8 @@ def test_the_first_screen(said):
     _, scene, run, error, measured = said
     (found,) = [result for result in tumbling.results(measured) if result.dt == DT and result.method == run_name(measured, run)]
     assert close(found.error, error)
-    section = tumbling.section(measured, [found])
-    (drawing,) = [block for block in walk(section.blocks) if isinstance(block, Motion)]
+    section, moving = tumbling.section(measured, [found]), tumbling.motion_section(measured, [found])
+    (drawing,) = [block for block in walk(moving.blocks) if isinstance(block, Motion)]
     _, panels = make_panels(drawing.trajectories, drawing.labels, drawing.truth, drawing.values)
     assert panels[1].sizes[ERROR][-1] == found.error  # the page shows one digit
     drifts = {name: float(values[-1]) for name, values in panels[1].sizes.items() if name != ERROR}

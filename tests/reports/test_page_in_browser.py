@@ -114,10 +114,10 @@ def test_nothing_is_asked_for_but_the_file_and_nothing_goes_wrong(opened, folder
 
 
 def test_the_first_look_is_short(opened, folder):
-    words = opened.execute_script(
-        "return [...document.querySelectorAll('#motion > p:not(.csv)')].map(e => e.textContent).join(' ')"
-    )
-    assert 10 < len(words.split()) <= 60
+    words = opened.execute_script("return document.body.innerText")
+    assert 50 < len(words.split()) <= 300  # MEASURE
+    end = opened.execute_script("return document.querySelector('main > details').getBoundingClientRect().bottom")
+    assert end + opened.execute_script("return scrollY") < 1000  # MEASURE
     entries = opened.execute_script(
         "return [...document.querySelectorAll('.legend')].map(l => [...l.querySelectorAll('.entry')]"
         ".filter(e => e.checkVisibility()).length).filter(n => n)"
@@ -128,10 +128,19 @@ def test_the_first_look_is_short(opened, folder):
     assert opened.execute_script("return document.querySelectorAll('#motion .motion figure').length") >= 3
 
 
+def test_a_link_of_the_header_opens_the_part_behind_the_click(folder, tmp_path):
+    with open_drawn(folder / "index.html", tmp_path) as browser:
+        shown = "return document.querySelector('#drift h3').checkVisibility()"
+        assert not browser.execute_script(shown)
+        browser.find_element("css selector", "nav a[href='#drift']").click()
+        wait(browser, shown)
+        wait(browser, "return document.querySelectorAll('#drift .chart svg').length")
+
+
 def test_a_table_has_its_rows_as_csv(opened):
-    link = opened.find_element("css selector", "#motion .csv a")
+    link = opened.find_element("css selector", "#results .csv a")
     opened.execute_script("arguments[0].click()", link)
-    wait(opened, "return document.querySelector('#motion .csv a').download")
+    wait(opened, "return document.querySelector('#results .csv a').download")
     text = opened.execute_async_script("fetch(arguments[0].href).then(r => r.text()).then(arguments[1])", link)
     found = pd.read_csv(io.StringIO(text))
     measured = pd.read_csv(Path(opened.current_url.removeprefix("file://")).parent / "measurements.csv")

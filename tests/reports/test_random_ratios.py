@@ -175,7 +175,7 @@ def test_a_ratio_has_an_interval_over_processes_and_is_open_around_1():
     shown = texts(random_bodies.as_table(even))[0]
     assert shown[3:6] == ["0", "1", "0"]
     assert re.fullmatch(r"≈ 1\.03 \(0\.9\d+ to 1\.\d+\)", shown[6])
-    assert "1 are open" in random_bodies.sentence(even)
+    assert "1 undecided" in random_bodies.sentence(even)
 
 
 def test_each_engine_has_a_row():
