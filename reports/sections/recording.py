@@ -59,4 +59,5 @@ def two_blocks(verification: Verification) -> list[Block]:
     return [
         Section(f"{recording.subject}: {recording.verdict}", [*described(recording), *recording_blocks(recording)])
         for recording in (details.first, details.second)
+        if recording.details is not None  # without a body, a recording that does not determine one is not compared
     ]
