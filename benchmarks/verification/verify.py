@@ -367,8 +367,12 @@ def _verify_recordings(
     from .recordings import table, verdict
     from .recordings.layout import Options
 
+    if together and files[0].samefile(files[1]):
+        raise BadInput("subjects", f"the file {str(files[0])!r} twice", "two recordings, or one")
     if body is None and not together:
-        allowed = "the scene of the recordings, by its name or file; only two recordings can be compared without one"
+        allowed = (
+            "the scene of the recordings, by its name or file. Two files without a folder can also be compared without one"
+        )
         raise BadInput("body", "no body", allowed)
     if body is None and start != "row":
         raise BadInput("start", "'scene' without a body", "row, or a body")

@@ -40,8 +40,10 @@ LEAST_NOISE, LEAST_VISIBLE = 1e-12, 1e-8
 differences for slopes are not better than 1e-10."""
 DETERMINED = 0.01
 """Largest relative standard deviation of an inertia that a recording determines."""
-FLATTEST = 0.02
-"""Smallest moment of an estimated inertia, relative to the largest one."""
+FLATTEST = 1e-5, 0.02
+"""Smallest moments with which a fit begins, relative to the largest one: noise can make estimates negative."""
+POOR = 1e-4
+"""Smallest moment of an estimate, relative to their sum, that a fit trusts: smaller ones were negative."""
 NULL = 1e-6
 """Relative singular value below which an inertia in this direction is arbitrary."""
 LEFT, LEFT_BY_SPLINES, LEFT_BY_NOISE = 1e-6, 0.02, 30.0
@@ -127,7 +129,9 @@ def _fit(recording: Recording, error: float | None, guesses: Sequence[Array]) ->
         freedom = Freedom.NOT_FREE if left > _most_left(recording) else Freedom.OPEN
         best = FreeBody(recording, freedom, _scene(estimates[0], *first), np.zeros((5, 6)), np.full(5, math.inf))
     few = len(recording.t) < FEWEST_ROWS
-    return replace(best, freedom=Freedom.OPEN if few or not close else best.freedom)
+    # An estimate that no body has is far from the best one, so that a fit can miss it.
+    poor = left <= _most_left(recording) and np.linalg.eigvalsh(estimates[0])[0] < POOR * np.trace(estimates[0])
+    return replace(best, freedom=Freedom.OPEN if few or poor or not close else best.freedom)
 
 
 def _most_left(recording: Recording) -> float:
@@ -214,7 +218,8 @@ def _estimate(t: Array, data: States) -> tuple[list[Array], Array, float, bool]:
     if not np.isfinite(matrix).all():
         return [np.eye(3)], w[0], 0.0, False
     _, sizes, rows = np.linalg.svd(matrix, full_matrices=False)
-    return [*_candidates(sizes, rows)], w[0], float(sizes[-1]) / math.sqrt(len(t)) * close, close
+    estimates = [*_candidates(sizes, rows)]
+    return estimates, w[0], float(sizes[-1]) / math.sqrt(len(t)) * close, close
 
 
 def _candidates(sizes: Array, rows: Array) -> Iterator[Array]:
@@ -226,5 +231,5 @@ def _candidates(sizes: Array, rows: Array) -> Iterator[Array]:
     for vector in vectors:
         J = np.tensordot(vector, _BASIS, 1)
         moments, axes = np.linalg.eigh(J * (np.sign(np.trace(J)) or 1.0))
-        if moments[-1] > 0:
-            yield (axes * np.maximum(moments, FLATTEST * moments[-1])) @ axes.T
+        for flattest in FLATTEST if moments[0] < FLATTEST[1] * moments[-1] else FLATTEST[:1]:
+            yield (axes * np.maximum(moments, flattest * moments[-1])) @ axes.T

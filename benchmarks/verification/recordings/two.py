@@ -61,11 +61,12 @@ class Difference:
 
 @dataclass(frozen=True)
 class Two:
-    """The verifications of two recordings, and the difference between them."""
+    """The verifications of two recordings, the difference between them, and what is assumed of their body; "" with a body."""
 
     first: Verification
     second: Verification
     difference: Difference
+    assumed: str = ""
 
 
 def verify_two(
@@ -102,8 +103,12 @@ def verify_both(
     from_row: bool,
     errors: tuple[float | None, float | None],
     tell: Callable[[str], object] = lambda _: None,
+    decides: str = ". --start scene decides",
 ) -> Verification:
-    """Verify two recordings with different names, as `verify_two`, each with an allowed error of its own."""
+    """Verify two recordings with different names, as `verify_two`, each with an allowed error of its own.
+
+    `decides` ends the reason if both are right, and differ.
+    """
     first, second = pair
     rows, made = dict[str, Rows](), dict[str, Verification]()
     allowed = dict(zip((first[0], second[0]), errors, strict=True))
@@ -127,7 +132,7 @@ def verify_both(
     verdicts = {a.verdict, b.verdict}
     verdict = Verdict.WRONG if Verdict.WRONG in verdicts else Verdict.UNDECIDED
     verdict = Verdict.NOT_TESTED if difference.missing else Verdict.RIGHT if difference.agrees else verdict
-    return join(a, b, difference, verdict, _reason(a, b, difference, relation), both[0].allowed.by)
+    return join(a, b, difference, verdict, _reason(a, b, difference, relation, decides), both[0].allowed.by)
 
 
 def join(
@@ -151,7 +156,7 @@ def join(
     return Verification(names, "recordings", [*a.findings, *b.findings, finding], reason, notes, Two(a, b, difference))
 
 
-def _reason(a: Verification, b: Verification, difference: Difference, relation: str) -> str:
+def _reason(a: Verification, b: Verification, difference: Difference, relation: str, decides: str) -> str:
     """Return which of two recordings is wrong, and by which mistake."""
     size = "" if difference.missing else f"{number(difference.error[difference.worse])} {UNITS[difference.worse]}"
     both = (a.verdict, b.verdict)
@@ -162,7 +167,7 @@ def _reason(a: Verification, b: Verification, difference: Difference, relation: 
         if difference.agrees:
             return f"both are right, and differ by at most {size}"
         how = f"{b.subject} has the motion of {a.subject} {relation}" if relation else "from different starts"
-        return f"both are motions of this body, {how}: they differ by {size} at {difference.time:g} s. --start scene decides"
+        return f"both are motions of this body, {how}: they differ by {size} at {difference.time:g} s{decides}"
     if both == (Verdict.WRONG, Verdict.WRONG):
         same = bool(first.mistake) and first.mistake == second.mistake
         if difference.agrees and (not same or first.mistake in BODIES):

@@ -54,17 +54,23 @@ def verify_two_alone(
     for i in sorted((0, 1), key=lambda i: (not fits[i].determined, float(fits[i].sizes.max()))):
         if fits[i].freedom is Freedom.FREE:
             errors = [_widen(fits[i], recording, error) if i != j else error for j, (_, recording) in enumerate(pair)]
-            made[i] = verify_both(fits[i].scene, pair, True, (errors[0], errors[1]), tell)
+            made[i] = verify_both(fits[i].scene, pair, True, (errors[0], errors[1]), tell, decides="")
             if all(verification.verdict is Verdict.RIGHT for verification in _parts(made[i])):
-                return _noted(replace(made[i], reason=f"{made[i].reason}; {_body(fits[i])}"))
+                return _assuming(replace(made[i], reason=f"{made[i].reason}; {_body(fits[i])}"))
     decisive = [i for i in made if fits[i].determined]
     if not decisive:
-        return _noted(_undecided(pair, fits, error))
+        return _assuming(_undecided(pair, fits, error))
     i = decisive[0]
     j, other = 1 - i, _parts(made[i])[1 - i]
-    if other.verdict is not Verdict.WRONG or (fits[j].freedom is Freedom.NOT_FREE):
-        return _noted(replace(made[i], reason=f"{made[i].reason}; {_body(fits[i], pair[i][0])}"))
-    return _noted(_either(pair, fits, made, i))
+    if other.verdict is not Verdict.WRONG:
+        return _assuming(replace(made[i], reason=f"{made[i].reason}; {_body(fits[i], pair[i][0])}"))
+    if fits[j].freedom is Freedom.NOT_FREE:
+        reason = (
+            f"{other.subject} is wrong, if the body rotates freely: {other.reason}. {pair[i][0]} is a free rotation of a body "
+            f"with the moments {fits[i].ratios}, and {other.subject} of none"
+        )
+        return _assuming(replace(made[i], reason=reason))
+    return _assuming(_either(pair, fits, made, i))
 
 
 def _widen(fit: FreeBody, recording: object, error: float | None) -> float | None:
@@ -83,9 +89,11 @@ def _parts(verification: Verification) -> tuple[Verification, Verification]:
     return verification.details.first, verification.details.second
 
 
-def _noted(verification: Verification) -> Verification:
-    """Return a verification with a note on the assumption."""
-    return replace(verification, notes=[f"{ASSUMED}.", *verification.notes])
+def _assuming(verification: Verification) -> Verification:
+    """Return a verification with the assumption."""
+    assert isinstance(verification.details, Two)
+    details = replace(verification.details, assumed=f"{ASSUMED}.")
+    return replace(verification, notes=[details.assumed, *verification.notes], details=details)
 
 
 def _body(fit: FreeBody, name: str = "") -> str:
@@ -95,20 +103,21 @@ def _body(fit: FreeBody, name: str = "") -> str:
     return f"the body was fitted to {name or 'them'}, with the moments {fit.ratios}"
 
 
-def _mistake(verification: Verification) -> str:
-    """Return the mistakes of a recording, for a sentence."""
+def _mistake(verification: Verification, fit: FreeBody) -> str:
+    """Return the mistakes of a recording, for a sentence; `fit` is the body of its own."""
     sentences = [uncapitalised(cause.sentence) for finding in verification.findings for cause in finding.causes]
-    return " or ".join(sentences) or "no known mistake explains it"
+    unknown = "it is the motion of another body" if fit.determined else "no known mistake explains it"
+    return " or ".join(sentences) or unknown
 
 
 def _either(pair: Pair, fits: list[FreeBody], made: dict[int, Verification], i: int) -> Verification:
     """Return that one of two recordings is wrong, and the files do not tell which: the first direction is from recording i."""
     j = 1 - i
     names, parts, texts = [name for name, _ in pair], list(_parts(made[i])), list[str]()
-    texts.append(f"If {names[i]} is right, {names[j]} is wrong: {_mistake(parts[j])}")
+    texts.append(f"If {names[i]} is right, {names[j]} is wrong: {_mistake(parts[j], fits[j])}")
     if j in made and fits[j].determined:
         parts[i] = _parts(made[j])[i]
-        texts.append(f"If {names[j]} is right, {names[i]} is wrong: {_mistake(parts[i])}")
+        texts.append(f"If {names[j]} is right, {names[i]} is wrong: {_mistake(parts[i], fits[i])}")
         which = f"each is a free rotation of a body of its own, with the moments {fits[0].ratios} and {fits[1].ratios}"
     else:
         own = "is one of another body, which it does not determine"

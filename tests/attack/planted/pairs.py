@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -70,8 +71,13 @@ def choose(number: int) -> list[tuple[str, str]]:
 
 
 def plant(number: int) -> Pair:
-    """Return a pair."""
-    draw, mistakes = Draw(500_000 + number), choose(number)
+    """Return a pair: the first drawn one whose mistakes are larger than noise and digits."""
+    drawn = (_plant(number, Draw(500_000 + number + len(PAIRS) * attempt)) for attempt in count())
+    return next(pair for pair in drawn if all(pair.made[place].expected == "wrong" for place in pair.wrong))
+
+
+def _plant(number: int, draw: Draw) -> Pair:
+    mistakes = choose(number)
     world, rate = draw_free(draw, [name for _, name in mistakes])
     gap = float(f"{2 * math.pi / draw.between(25, 40) / rate:.2e}")
     n = int(draw.between(60, 110))
@@ -127,7 +133,8 @@ def is_free(t: Any, Y: Any, grain: Any, scale: float) -> bool:
     ball = np.array([0.5, 0, 0, 0.5, 0, 0.5])
     J = np.tensordot(small.T @ (small @ ball) if len(small) > 1 else null[-1], np.array(basis), 1)
     moments, axes = np.linalg.eigh(J * np.sign(np.trace(J)))
-    half = axes * np.sqrt(np.maximum(moments, 0.02 * moments[-1]) / moments[-1])
+    least = 1e-4 if moments[0] > 0 else 0.02
+    half = axes * np.sqrt(np.maximum(moments, least * moments[-1]) / moments[-1])
     lower = np.linalg.qr(half.T)[1].T
     at = np.tril_indices(3)
 
