@@ -885,10 +885,10 @@ def fit_moments(case: Compared) -> Explanation:
     def inertia(p: Array) -> Array:
         return body.R_BP @ np.diag(body.moments * np.exp(np.clip([*[0.0] * ratios, *p], -3, 3))) @ body.R_BP.T
 
-    initial, p, made = case.fit(_with_inertia(case, inertia), np.zeros(3 - ratios), np.full(3 - ratios, 1e-5))
+    initial, p, made = case.fit(motion_with_inertia(case, inertia), np.zeros(3 - ratios), np.full(3 - ratios, 1e-5))
     unit = body.moments[0] if ratios else 1.0
     moments, own = np.diag(body.R_BP.T @ inertia(p) @ body.R_BP) / unit, " : ".join(f"{x:.4g}" for x in body.moments / unit)
-    off = [0.0] * ratios + (2 * case.deviations(_with_inertia(case, inertia), np.append(initial, p), 1e-5)[6:]).tolist()
+    off = [0.0] * ratios + (2 * case.deviations(motion_with_inertia(case, inertia), np.append(initial, p), 1e-5)[6:]).tolist()
     fitted = " : ".join(f"{x:.6g}" + f" ± {x * d:.1g}" * (d > 0) for x, d in zip(moments, off, strict=True))
     text = (
         f"The principal moments that fit the rows best {'have the ratios' if ratios else 'are'} {fitted} (of the body: {own})"
@@ -908,7 +908,7 @@ def _possible(explanation: Explanation) -> Explanation:
     return replace(explanation, explains=explanation.explains and bool(2 * moments.max() < (1 + 1e-6) * moments.sum()))
 
 
-def _with_inertia(case: Compared, inertia: Callable[[Array], Array]) -> Solution:
+def motion_with_inertia(case: Compared, inertia: Callable[[Array], Array]) -> Solution:
     """Return the motion as a function of initial states and the numbers of an inertia."""
 
     def motion(R: Array, w: Array, p: Array, n: int) -> tuple[Array, Array]:
@@ -919,19 +919,24 @@ def _with_inertia(case: Compared, inertia: Callable[[Array], Array]) -> Solution
     return motion
 
 
-def _other_body(case: Compared) -> Explanation | None:
-    """Return the explanation by another inertia; None if none can explain the first rows."""
-    free = case.scene.free and case.scene.body.rotor_momentum is None
-    J = case.scene.body.inertia
+def stretched(J: Array, same_trace: bool) -> Callable[[Array], Array]:
+    """Return the function from six numbers to an inertia (3, 3): J for zeros; with `same_trace` all have the trace of J."""
 
     def inertia(p: Array) -> Array:
         stretch = expm(np.clip(p, -3, 3)[[[0, 1, 2], [1, 3, 4], [2, 4, 5]]])
         made = stretch @ J @ stretch
-        return made * (np.trace(J) / np.trace(made)) if free else made
+        return made * (np.trace(J) / np.trace(made)) if same_trace else made
 
+    return inertia
+
+
+def _other_body(case: Compared) -> Explanation | None:
+    """Return the explanation by another inertia; None if none can explain the first rows."""
+    free = case.scene.free and case.scene.body.rotor_momentum is None
+    inertia = stretched(case.scene.body.inertia, free)
     mistake = BY_KEY["another body"]
     numbers = tuple(Number(f"stretch_{name}") for name in _INERTIA)
-    trial = Trial((mistake,), lambda of: _with_inertia(of, inertia), numbers)
+    trial = Trial((mistake,), lambda of: motion_with_inertia(of, inertia), numbers)
     explanation = attempt(case, replace(trial, mistakes=(replace(mistake, sentence=""),)))  # its sentence has no fitted number
     if explanation is None:
         return None

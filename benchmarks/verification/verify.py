@@ -169,7 +169,8 @@ def verify(
         Files of recorded motions, names of methods, engines or programs, command lines of programs, model files, folders of
         files, or methods themselves. Two recordings are also compared with each other.
     body
-        Scene, its name or its file, for recordings.
+        Scene, its name or its file, for recordings. Two recordings of a body that rotates freely can do without one: its
+        inertia is fitted to them, up to a factor.
     engines
         Engines that load model files; by default those that are installed. Without one, only links are checked.
     only
@@ -366,12 +367,24 @@ def _verify_recordings(
     from .recordings import table, verdict
     from .recordings.layout import Options
 
-    if body is None:
-        raise BadInput("body", "no body", "the scene of the recordings, by its name or file")
-    scene = body if isinstance(body, Scene) else registry.scene(os.fspath(body))
+    if together and files[0].samefile(files[1]):
+        raise BadInput("subjects", f"the file {str(files[0])!r} twice", "two recordings, or one")
+    if body is None and not together:
+        allowed = (
+            "the scene of the recordings, by its name or file. Two files without a folder can also be compared without one"
+        )
+        raise BadInput("body", "no body", allowed)
+    if body is None and start != "row":
+        raise BadInput("start", "'scene' without a body", "row, or a body")
     from_row = start == "row"
     read = table.read_all(files, Options(**reading))
     recordings = [(path.name, recording) for path, recording in zip(files, read, strict=True)]
+    if body is None:
+        from .recordings.two_alone import verify_two_alone
+
+        yield verify_two_alone(recordings[0], recordings[1], error, partial(tell, 0.0))
+        return
+    scene = body if isinstance(body, Scene) else registry.scene(os.fspath(body))
     if together:
         from .recordings.two import verify_two
 

@@ -62,6 +62,7 @@ LISTS = ("only", "pairs", "engines")
     epilog=epilog(
         "conservative verify run.csv --body my_body.toml                 is this recorded motion right?",
         "conservative verify a.csv b.csv --body my_body.toml             they disagree: which one is wrong?",
+        "conservative verify a.csv b.csv                                 the same, if nobody knows the body: it rotates freely",
         "conservative verify ./my_engine 'python my_engine.py'           programs",
         "conservative verify mujoco@3.12.0 drake:discrete                engines",
         "conservative verify ./my_engine --seed 7                        by motions that nobody has seen",
@@ -77,7 +78,8 @@ LISTS = ("only", "pairs", "engines")
 @click.option(
     "--body",
     shell_complete=completion.scenes,
-    help="Recordings: scene (file or name) with the body, the field and the initial state.",
+    help="Recordings: scene (file or name) with the body, the field and the initial state. Two recordings of a body that "
+    "rotates freely need none.",
 )
 @click.option(
     "--columns",

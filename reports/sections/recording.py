@@ -57,6 +57,10 @@ def two_blocks(verification: Verification) -> list[Block]:
     details = verification.details
     assert isinstance(details, Two)
     return [
-        Section(f"{recording.subject}: {recording.verdict}", [*described(recording), *recording_blocks(recording)])
-        for recording in (details.first, details.second)
+        *([Paragraph(details.assumed)] if details.assumed else []),
+        *(
+            Section(f"{recording.subject}: {recording.verdict}", [*described(recording), *recording_blocks(recording)])
+            for recording in (details.first, details.second)
+            if recording.details is not None
+        ),  # without a body, a recording that does not determine one is not compared
     ]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from conservative.attitude import Array
+from conservative.attitude import Array, angle_between
 from conservative.errors import BadInput
 from conservative.number_text import number
 from conservative.scene import Scene
@@ -21,6 +21,11 @@ from .comparison import Rows, prepare
 from .table import Recording
 from .verdict import UNITS, verify_recording
 
+GRID, NEAREST, SHIFTS, SMALL_SHIFT = 0.1, 8, 8, 1e-6
+"""Distance of the shifts of time that are tried, rad, the number of the best that are improved, the steps of each, and the
+shift for slopes, rad."""
+RELATED = 3.0
+"""Largest errors of related motions, over the allowed ones: each has a start with an error of its own."""
 BODIES = {"another body", "other moments"}
 """Keys of mistakes of the body. If both recordings have one, `--body` names the wrong body, and the recordings may be right."""
 Named = tuple[str, Recording]
@@ -56,11 +61,12 @@ class Difference:
 
 @dataclass(frozen=True)
 class Two:
-    """The verifications of two recordings, and the difference between them."""
+    """The verifications of two recordings, the difference between them, and what is assumed of their body; "" with a body."""
 
     first: Verification
     second: Verification
     difference: Difference
+    assumed: str = ""
 
 
 def verify_two(
@@ -81,12 +87,35 @@ def verify_two(
     BadInput
         For the first recording that cannot be compared, with the name of its file.
     """
-    if first[0] == second[0]:
-        first, second = (f"{first[0]} (first)", first[1]), (f"{second[0]} (second)", second[1])
+    return verify_both(scene, name_apart(first, second), from_row, (error, error), tell)
+
+
+def name_apart(first: Named, second: Named) -> tuple[Named, Named]:
+    """Return two recordings with different names."""
+    if first[0] != second[0]:
+        return first, second
+    return (f"{first[0]} (first)", first[1]), (f"{second[0]} (second)", second[1])
+
+
+def verify_both(
+    scene: Scene,
+    pair: tuple[Named, Named],
+    from_row: bool,
+    errors: tuple[float | None, float | None],
+    tell: Callable[[str], object] = lambda _: None,
+    decides: str = ". --start scene decides",
+) -> Verification:
+    """Verify two recordings with different names, as `verify_two`, each with an allowed error of its own.
+
+    `decides` ends the reason if both are right, and differ.
+    """
+    first, second = pair
     rows, made = dict[str, Rows](), dict[str, Verification]()
+    allowed = dict(zip((first[0], second[0]), errors, strict=True))
     # First the recording with attitudes and rates: one without the other takes the missing part of its start from it.
-    for name, recording in sorted((first, second), key=_missing):
+    for name, recording in sorted(pair, key=_missing):
         started = _start(scene, recording, [*zip(rows.values(), made.values(), strict=True)]) if from_row else scene
+        error = allowed[name]
         try:
             rows[name] = prepare(started.rotation_only, recording, from_row, error)
             made[name] = verify_recording(started, recording, from_row, error, _labelled(tell, name), name)
@@ -96,11 +125,21 @@ def verify_two(
             raise BadInput(refused.argument, f"{name}: {refused.got}", refused.allowed) from None
     tell("difference")
     a, b = made[first[0]], made[second[0]]
-    difference = _difference([rows[first[0]], rows[second[0]]], (first[1], second[1]), from_row)
-    names = f"{a.subject} and {b.subject}"
+    both, recordings = (rows[first[0]], rows[second[0]]), (first[1], second[1])
+    difference = find_difference(both, recordings, from_row)
+    right = (a.verdict, b.verdict) == (Verdict.RIGHT, Verdict.RIGHT)
+    relation = find_relation(both, recordings) if right and not difference.agrees and not difference.missing else ""
     verdicts = {a.verdict, b.verdict}
     verdict = Verdict.WRONG if Verdict.WRONG in verdicts else Verdict.UNDECIDED
     verdict = Verdict.NOT_TESTED if difference.missing else Verdict.RIGHT if difference.agrees else verdict
+    return join(a, b, difference, verdict, _reason(a, b, difference, relation, decides), both[0].allowed.by)
+
+
+def join(
+    a: Verification, b: Verification, difference: Difference, verdict: Verdict, reason: str, by: tuple[str, str] = ("", "")
+) -> Verification:
+    """Return the verification of two recordings, with a `verdict` on the difference between them, and what allows it."""
+    names = f"{a.subject} and {b.subject}"
     worse = 0 if difference.missing else difference.worse
     finding = Finding(
         names,
@@ -110,16 +149,14 @@ def verify_two(
         difference.error[worse],
         difference.allowed[worse],
         UNITS[worse],
-        rows[first[0]].allowed.by[worse],
+        by[worse],
         detail=difference.missing,
     )
     notes = [f"{verification.subject}: {note}" for verification in (a, b) for note in verification.notes]
-    return Verification(
-        names, "recordings", [*a.findings, *b.findings, finding], _reason(a, b, difference), notes, Two(a, b, difference)
-    )
+    return Verification(names, "recordings", [*a.findings, *b.findings, finding], reason, notes, Two(a, b, difference))
 
 
-def _reason(a: Verification, b: Verification, difference: Difference) -> str:
+def _reason(a: Verification, b: Verification, difference: Difference, relation: str, decides: str) -> str:
     """Return which of two recordings is wrong, and by which mistake."""
     size = "" if difference.missing else f"{number(difference.error[difference.worse])} {UNITS[difference.worse]}"
     both = (a.verdict, b.verdict)
@@ -129,10 +166,8 @@ def _reason(a: Verification, b: Verification, difference: Difference) -> str:
             return f"both are right; they are not compared with each other: {difference.missing}"
         if difference.agrees:
             return f"both are right, and differ by at most {size}"
-        return (
-            f"both are motions of this body, from different starts: they differ by {size} at {difference.time:g} s. "
-            "--start scene decides"
-        )
+        how = f"{b.subject} has the motion of {a.subject} {relation}" if relation else "from different starts"
+        return f"both are motions of this body, {how}: they differ by {size} at {difference.time:g} s{decides}"
     if both == (Verdict.WRONG, Verdict.WRONG):
         same = bool(first.mistake) and first.mistake == second.mistake
         if difference.agrees and (not same or first.mistake in BODIES):
@@ -180,7 +215,7 @@ def _start(scene: Scene, recording: Recording, before: list[tuple[Rows, Verifica
     return scene
 
 
-def _difference(rows: list[Rows], recordings: tuple[Recording, Recording], from_row: bool) -> Difference:
+def find_difference(rows: tuple[Rows, Rows], recordings: tuple[Recording, Recording], from_row: bool) -> Difference:
     """Return the largest difference between two recordings at common times.
 
     Without common times, the second one is interpolated: not its rows, which change quickly, but their departures from an
@@ -232,3 +267,48 @@ def _depart(reference: Compared, t: Array, data: States) -> Array:
     """Return the departures (n, 6) of samples from an exact motion: turns, rad, and rates, relative; 0 without data."""
     R, w = truth(reference.scene, reference.start, t)
     return differ(R, w, R if data[0] is None else data[0], w if data[1] is None else data[1], reference.scale)
+
+
+def find_relation(rows: tuple[Rows, Rows], recordings: tuple[Recording, Recording]) -> str:
+    """Return how the second of two free rotations of one body follows from the first, as the end of a sentence; "" if not.
+
+    It has another origin of its clock, or its world has other axes, or both. Two rotations from different starts that are not
+    related so are different motions.
+    """
+    a, b = (row.case for row in rows)
+    scene = a.scene
+    if not scene.free or scene.body.rotor_momentum is not None or not np.array_equal(scene.body.inertia, b.scene.body.inertia):
+        return ""
+    clock = float(a.t[0] - recordings[0].t[0])  # from times of the file to times of the exact motion
+    times = recordings[1].t[0] + clock + (b.t - b.t[0])
+    some = np.unique(np.linspace(0, len(times) - 1, 60).astype(int))
+    times, (R, w) = times[some], (x[some] for x in b.exact)
+    allowed = rows[0].allowed.errors + rows[1].allowed.errors * [1, b.scale / a.scale]
+
+    def off(shift: float) -> tuple[Array, Array, Array]:
+        """Return the turn of the world, and the errors of attitudes and rates that it and a shift of time leave."""
+        R_a, w_a = truth(scene, a.start, times + shift)
+        U, _, V = np.linalg.svd((R @ np.swapaxes(R_a, 1, 2)).sum(axis=0))
+        turn = U @ np.diag([1, 1, np.linalg.det(U @ V)]) @ V
+        return turn, angle_between(turn @ R_a, R), np.linalg.norm(w_a - w, axis=1) / a.scale
+
+    longest = max(float(a.t[-1] - a.t[0]), float(times[-1] - times[0]))
+    grid = np.arange(-longest, longest, GRID / a.scale)
+    rates = truth(scene, a.start, times[0] + grid)[1]
+    nearest = np.argsort(np.linalg.norm(rates - w[0], axis=1), kind="stable")[:NEAREST]
+    have = [x is not None and y is not None for x, y in zip(a.data, b.data, strict=True)]
+    for start in [0.0, *grid[np.sort(nearest)].tolist()]:
+        shift = start
+        for _ in range(SHIFTS if start else 0):
+            w_a, later = (truth(scene, a.start, times + at)[1] for at in (shift, shift + SMALL_SHIFT / a.scale))
+            slope = (later - w_a) / (SMALL_SHIFT / a.scale)
+            shift += float(((w - w_a) * slope).sum() / ((slope * slope).sum() or 1.0))
+        turn, *errors = off(shift)
+        if any(error.max() > RELATED * limit for error, limit in zip(errors, allowed, strict=True)):
+            continue
+        vector = Rotation.from_matrix(turn).as_rotvec()
+        parts = [f"{abs(shift):.6g} s {'later' if shift < 0 else 'earlier'}"] * bool(abs(shift) * a.scale > allowed.max())
+        if have[0] and np.linalg.norm(vector) > allowed[0]:
+            parts.append(f"in a world that is turned by ({', '.join(f'{x:.5g}' for x in vector)}) rad")
+        return " and ".join(parts)
+    return ""
