@@ -176,8 +176,8 @@ def _named(text: str) -> Runnable:
 
 def of_method(method: Method, kind: str) -> Runnable:
     """Return a method, an engine or a program as a back end."""
-    settings = []
-    names = {field.name for field in fields(method)}  # type: ignore[arg-type]  # methods are dataclasses
+    settings = list[tuple[str, tuple[Any, ...]]]()
+    names = {field.name for field in fields(method)}
     if "precision" in names:
         settings.append(("precision", ("f32", "f64")))
     if (tolerance := tolerance_setting(method)) is not None:
@@ -198,7 +198,7 @@ def of_method(method: Method, kind: str) -> Runnable:
 
 
 def _solve_with(method: Method, name: str, value: Any, scene: Scene, grid: Grid) -> Any:
-    changed: Any = replace(method, **{name: value})  # type: ignore[type-var]
+    changed: Any = replace(method, **{name: value})
     return solver(changed)(scene, grid)
 
 

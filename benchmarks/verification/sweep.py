@@ -14,14 +14,15 @@ import numpy as np
 from conservative.attitude import Array, angle_between
 from conservative.errors import IntegrationFailed, Unsupported
 from conservative.grid import Grid
-from conservative.number_text import number
+from conservative.number_text import number, short_power
 
 from ..measures.convergence_order import Order, observed_order
 from .back_ends import Runnable
-from .compare import FLOOR, States, take_rows
+from .compare import take_rows
 from .motions.motion import Motion
-from .programs import RESOLVED, Solve, in_principal_axes
-from .solution import truth
+from .programs import RESOLVED, Solve, in_principal_axes, is_generic
+from .solution import States, truth
+from .which import UNITS
 
 PARTS = (1, 2, 4, 8, 16, 32, 64)
 """Steps in 0.1 rad, from coarse to fine."""
@@ -31,6 +32,10 @@ ELSEWHERE = 3.0
 """Error at the shortest step over the change by the last halving of the step, from which steps do not explain the error."""
 CONVERGES = 0.5
 """Smallest order of a method that converges."""
+AT_ROUNDING, AT_TOLERANCE = 1e-5, 1e-3
+"""Errors at the shortest step that rounding and tolerances of iterations explain, and the tolerance of a chosen step."""
+FEWER, BELOW = PARTS[:5], 0.3
+"""Steps in 0.1 rad at which an order is measured without the exact motion, and how far it may be below a whole number."""
 
 
 class Limit(StrEnum):
@@ -132,34 +137,22 @@ def choose(motions: Sequence[Motion], supported: Callable[[Motion], bool]) -> Mo
     able = [motion for motion in motions if supported(motion)]
     own = [motion for motion in able if motion.own]
     free = [motion for motion in able if not motion.features]
-    longest = max(own or free or able, key=lambda motion: motion.steps * motion.samples, default=None)
-    return longest
+    generic = [motion for motion in free if is_generic(motion)]
+    return max(own or generic or free or able, key=lambda motion: motion.steps * motion.samples, default=None)
 
 
-@dataclass(frozen=True, eq=False)
-class Run:
-    """Samples of a run at the times of a motion, in the body axes of the motion, or None for a run that failed."""
-
-    data: States
-
-    @property
-    def failed(self) -> bool:
-        """Whether there are no samples."""
-        return all(part is None for part in self.data)
-
-
-def _run(solve: Solve, motion: Motion, principal: bool, parts: int) -> Run:
-    """Return the samples of a motion with `parts` steps in 0.1 rad."""
+def _run(solve: Solve, motion: Motion, principal: bool, parts: int) -> States:
+    """Return the samples of a motion with `parts` steps in 0.1 rad, in its body axes; (None, None) if the run failed."""
     every = motion.steps * parts
     asked = in_principal_axes(motion) if principal else motion
     grid = Grid(motion.step / parts, every * motion.samples, every)
     try:
         answer = solve(asked.scene, grid)
     except (Unsupported, IntegrationFailed):
-        return Run((None, None))
+        return None, None
     if len(answer.t) < grid.n_samples:
-        return Run((None, None))
-    return Run(in_body_axes(take_rows((answer.R_WB, answer.w_WB_B), slice(1, None)), motion, asked))
+        return None, None
+    return in_body_axes(take_rows((answer.R_WB, answer.w_WB_B), slice(1, None)), motion, asked)
 
 
 def in_body_axes(data: States, motion: Motion, asked: Motion) -> States:
@@ -172,32 +165,30 @@ def in_body_axes(data: States, motion: Motion, asked: Motion) -> States:
 
 def apart(first: States, second: States, scale: float) -> tuple[float, float]:
     """Return the largest differences of two motions: of attitudes, rad, and of rates, relative; nan where one has none."""
+    turned = rates = math.nan
     with np.errstate(all="ignore"):
-        turned = (
-            math.nan if first[0] is None or second[0] is None else float(np.max(angle_between(first[0], second[0]), initial=0))
-        )
-        rates = math.nan
+        if first[0] is not None and second[0] is not None:
+            turned = float(angle_between(first[0], second[0]).max())
         if first[1] is not None and second[1] is not None:
-            rates = float(np.linalg.norm(first[1] - second[1], axis=1).max(initial=0)) / scale
+            rates = float(np.linalg.norm(first[1] - second[1], axis=1).max()) / scale
     return turned, rates
 
 
-def self_order(runs: Sequence[Run], steps: Sequence[float], floor: float) -> tuple[float, Array]:
-    """Return the order by which motions approach each other as the step becomes shorter, and their differences.
-
-    It needs no exact motion, so that wrong equations do not change it. It is nan if all differences are round-off.
-    """
-    rates = [float(np.abs(run.data[1]).max()) for run in runs if run.data[1] is not None]
+def changes(runs: Sequence[States], part: int) -> Array:
+    """Return how much motions change from each step to the next shorter one (n - 1,): attitudes, rad (part 0), or rates (1)."""
+    rates = [float(np.abs(w).max()) for _, w in runs if w is not None]
     scale = max(rates, default=1.0) or 1.0
+    return np.array([apart(a, b, scale)[part] for a, b in pairwise(runs)])
 
-    def gap(first: Run, second: Run) -> float:
-        turned, other = apart(first.data, second.data, scale)
-        return other if math.isnan(turned) else turned
 
-    gaps = np.array([gap(first, second) for first, second in pairwise(runs)])
-    good = [k for k in range(len(gaps)) if floor < gaps[k] < 1.0]
-    slopes = [math.log(gaps[i] / gaps[j]) / math.log(steps[i] / steps[j]) for i, j in pairwise(good) if j == i + 1]
-    return (float(slopes[-1]) if slopes else math.nan), gaps
+def own_order(steps: Sequence[float], made: Array, floor: float) -> float:
+    """Return the order by which motions approach each other, from how much they change; nan if that is round-off.
+
+    It needs no exact motion, so wrong equations do not affect it.
+    """
+    good = [k for k, size in enumerate(made) if floor < size < 1.0]
+    slopes = [math.log(made[i] / made[j]) / math.log(steps[i] / steps[j]) for i, j in pairwise(good) if j == i + 1]
+    return slopes[-1] if slopes else math.nan
 
 
 def measured_order(found: Runnable, motions: Sequence[Motion]) -> int | None:
@@ -205,42 +196,39 @@ def measured_order(found: Runnable, motions: Sequence[Motion]) -> int | None:
 
     If the motions do not approach each other, it is 1: the order with the largest tolerances.
     """
-    orders, depends = [], False
-    floor = RESOLVED["f32" if found.single else "f64"]
+    orders, depends, floor = list[float](), False, RESOLVED["f32" if found.single else "f64"]
     for motion in motions:
-        parts = PARTS[:5]
-        runs = [_run(found.solve, motion, found.principal, n) for n in parts]
-        slope, gaps = self_order(runs, [motion.step / n for n in parts], floor)
-        depends = depends or bool((gaps > floor).any())
-        if not math.isnan(slope):
-            orders.append(slope)
-    if not orders:
+        runs = [_run(found.solve, motion, found.principal, n) for n in FEWER]
+        part = int(any(R is None for R, _ in runs))
+        made = changes(runs, part)
+        depends = depends or bool((made > floor).any())
+        orders.append(own_order([motion.step / n for n in FEWER], made, floor))
+    known = [order for order in orders if not math.isnan(order)]
+    if not known:
         return 1 if depends else None
-    return int(np.clip(math.floor(float(np.median(orders)) + 0.3), 1, 4))
+    return int(np.clip(math.floor(float(np.median(known)) + BELOW), 1, 4))
 
 
 def sweep(first: Runnable, second: Runnable, motion: Motion, tell: Callable[[str], object] = lambda what: None) -> Sweep:
-    """Run a motion with several steps, and with the other settings of both back ends. Parameters as in `parity`."""
+    """Run a motion with several steps, and with the other settings of both back ends."""
     sides, steps = (first, second), [motion.step / n for n in PARTS]
-    runs: list[list[Run]] = []
+    runs = list[list[States]]()
     for side in sides:
         tell(f"{side.name}: steps of {motion.name}")
         runs.append([_run(side.solve, motion, side.principal, n) for n in PARTS])
-    t = np.array(motion.t)
-    exact = truth(motion.scene, 0.0, t)
+    exact = truth(motion.scene, 0.0, np.array(motion.t))
     scale = float(np.linalg.norm(exact[1], axis=1).max()) or 1.0
-    parts_of = [next((run.data for run in some if not run.failed), (None, None)) for some in runs]
-    part = 0 if all(data[0] is not None for data in parts_of) else 1
+    # The quantity that shows more, of those that both have: rates in other axes do not change attitudes.
+    finest = np.array([apart(some[-1], exact, scale) for some in runs])
+    part = int(np.argmax(np.where(np.isfinite(finest).all(axis=0), finest, -1).max(axis=0)))
 
-    def error(run: Run) -> float:
-        return math.nan if run.failed else _finite(apart(run.data, exact, scale)[part])
+    def error(data: States, of: States = exact) -> float:
+        size = apart(data, of, scale)[part]
+        return size if math.isfinite(size) else math.nan
 
-    def between(a: Run, b: Run) -> float:
-        return math.nan if a.failed or b.failed else _finite(apart(a.data, b.data, scale)[part])
-
-    errors = [[error(run) for run in some] for some in runs]
-    gaps = [between(a, b) for a, b in zip(*runs, strict=True)]
-    series = [Series("step", "", tuple(steps), tuple(errors[0]), tuple(errors[1]), tuple(gaps))]
+    errors = [tuple(map(error, some)) for some in runs]
+    between = tuple(error(a, b) for a, b in zip(*runs, strict=True))
+    series = [Series("step", "", tuple(steps), errors[0], errors[1], between)]
     for k, side in enumerate(sides):
         other = runs[1 - k][-1]
         for setting in side.settings:
@@ -250,38 +238,25 @@ def sweep(first: Runnable, second: Runnable, motion: Motion, tell: Callable[[str
             made = [_run(solve, motion, side.principal, parts) for solve in setting.solvers]
             own, theirs = tuple(map(error, made)), (error(other),) * len(made)
             both = (own, theirs) if k == 0 else (theirs, own)
-            series.append(Series(setting.name, side.name, setting.values, *both, tuple(between(run, other) for run in made)))
-    convergences = [
-        _convergence(some, steps, values, side.single) for some, values, side in zip(runs, errors, sides, strict=True)
-    ]
-    return Sweep(
-        motion.name,
-        ("rad", "of the largest rate")[part],
-        tuple(series),
-        convergences[0],
-        convergences[1],
-        observed_order(steps, gaps),
-    )
+            series.append(Series(setting.name, side.name, setting.values, *both, tuple(error(run, other) for run in made)))
+    converged = [_convergence(some, part, steps, size, side) for some, size, side in zip(runs, errors, sides, strict=True)]
+    return Sweep(motion.name, UNITS[part], tuple(series), converged[0], converged[1], observed_order(steps, between))
 
 
-def _finite(x: float) -> float:
-    return x if math.isfinite(x) else math.nan
-
-
-def _convergence(runs: Sequence[Run], steps: Sequence[float], errors: Sequence[float], single: bool) -> Convergence:
-    floor = RESOLVED["f32"] if single else FLOOR
-    own, gaps = self_order(runs, steps, RESOLVED["f32" if single else "f64"])
-    order, last = observed_order(steps, errors), errors[-1]
+def _convergence(
+    runs: Sequence[States], part: int, steps: Sequence[float], errors: Sequence[float], side: Runnable
+) -> Convergence:
+    made, order, last = changes(runs, part), observed_order(steps, errors), errors[-1]
+    own = own_order(steps, made, RESOLVED["f32" if side.single else "f64"])
+    chooses = side.order is None and not side.measured  # its steps, by a tolerance that limits its error
     if math.isnan(last):
         limit = Limit.UNKNOWN
-    elif last <= floor:
+    elif last <= (AT_TOLERANCE if chooses else AT_ROUNDING * (10 if side.single else 1)):
         limit = Limit.EXACT
-    elif last > ELSEWHERE * gaps[-1]:
+    elif last > ELSEWHERE * made[-1]:
         limit = Limit.OTHER
-    elif not order.reason and order.slope >= CONVERGES:
-        limit = Limit.EXACT
     else:
-        limit = Limit.NOTHING
+        limit = Limit.NOTHING if order.reason or order.slope < CONVERGES else Limit.EXACT
     return Convergence(limit, order, last, own)
 
 
@@ -296,8 +271,9 @@ def sentence(name: str, convergence: Convergence, unit: str) -> str:
     if convergence.limit is Limit.NOTHING:
         return f"{name} does not converge: its error is {error} at the shortest step"
     if order.reason or order.slope < CONVERGES:
-        return f"{name} is within {error} of the exact motion at the shortest step, and its error does not fall with the step"
-    return f"{name} converges to the exact motion with order {order.slope:.2f} ± {max(order.stderr, 0.01):.2f}"
+        return f"{name} is within {error} of the exact motion, and its error does not fall with the step"
+    floor = "" if math.isnan(order.floor) else f", down to {number(order.floor)} {unit}"
+    return f"{name} converges to the exact motion with order {order.slope:.2f} ± {max(order.stderr, 0.01):.2f}{floor}"
 
 
 def sentences(first: str, second: str, result: Sweep) -> list[str]:
@@ -310,12 +286,18 @@ def sentences(first: str, second: str, result: Sweep) -> list[str]:
             "exact motion"
         )
     for series in result.series:
-        what = "a step" if series.setting == "step" else f"{series.setting} of {series.of}"
-        for level in LEVELS:
-            value = series.agree(level)
-            shown = value if not isinstance(value, float) else f"{number(value, 3)}{' s' * (series.setting == 'step')}"
-            where = f"from {what} of {shown} on" if series.setting == "step" else f"from {what} = {shown} on"
-            if value is None:
-                where = f"at no value of {what}" if series.setting != "step" else "at no step of the sweep"
-            out.append(f"they agree to {number(level)} {result.unit} {where}")
+        out += [f"they agree to {_power(level)} {result.unit} {_where(series, level)}" for level in LEVELS]
     return out
+
+
+def _power(level: float) -> str:
+    return short_power(f"{level:.0e}")
+
+
+def _where(series: Series, level: float) -> str:
+    """Return from which value of a setting on two back ends agree."""
+    value = series.agree(level)
+    if series.setting == "step":
+        return "at no step of the sweep" if value is None else f"from a step of {number(value, 3)} s on"
+    what = f"{series.setting} of {series.of}"
+    return f"at no value of {what}" if value is None else f"from {what} = {value} on"

@@ -7,14 +7,16 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from conservative import registry
-from conservative.attitude import Array, angle_between
+from conservative.attitude import angle_between
 from conservative.check import describe
 from conservative.errors import BadInput
 from conservative.grid import Grid
@@ -42,17 +44,14 @@ from .programs import (
     summary,
 )
 from .solution import States
-from .sweep import Limit, Sweep, apart, choose, in_body_axes, measured_order, sentence, sweep
-from .verify import Tell, require_motions
+from .sweep import Convergence, Limit, Sweep, apart, choose, in_body_axes, measured_order, sentence, sweep
+from .verify import Kind, Tell, require_motions
 from .which import UNITS, Difference, Side, which
 
 CHECKS = ("motions", "order", "parity")
 """Checks of two back ends: the exact motions of each, the convergence of each in a sweep of steps, and their difference."""
 KIND = "back ends"
 """`Verification.kind` of two back ends."""
-ELSEWHERE = 1e-5
-"""Error at the shortest step, rad, from which a back end that converges to another motion is wrong. Right ones that iterate to
-a tolerance leave up to 1e-6."""
 SLOPE = 0.5
 """Largest difference between the declared order and the measured one."""
 
@@ -63,10 +62,10 @@ class Curves:
 
     motion: str
     unit: str
-    t: Array
-    first: Array
-    second: Array
-    between: Array
+    t: tuple[float, ...]
+    first: tuple[float, ...]
+    second: tuple[float, ...]
+    between: tuple[float, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,20 +88,29 @@ class Parity:
         The verification of each.
     difference
         The largest difference between them, relative to what is allowed.
-    rows
-        The table motion x (first, second, first against second).
+    table
+        The motions x (first, second, first against second).
     sweep
         The sweep of settings; None if there is no motion that both run, or it was left out.
     curves
         Errors over time; None if there is no motion that both run.
     """
 
-    first: Verification
-    second: Verification
+    first: Verification = field(repr=False)  # JSON has their findings already
+    second: Verification = field(repr=False)
     difference: Difference
-    rows: tuple[Row, ...]
+    table: tuple[Row, ...] = field(repr=False)
     sweep: Sweep | None
     curves: Curves | None
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        """Yield errors over time: dictionaries of t, s, quantity and value."""
+        if self.curves is None:
+            return
+        names = f"error of {self.first.subject}", f"error of {self.second.subject}", "difference between them"
+        for name, values in zip(names, (self.curves.first, self.curves.second, self.curves.between), strict=True):
+            for t, value in zip(self.curves.t, values, strict=True):
+                yield {"t": t, "quantity": f"{name}, {self.curves.unit}", "value": value}
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,7 +199,7 @@ def parity(
         chosen = [motion_of(body if isinstance(body, Scene) else registry.scene(os.fspath(body))), *chosen]
     if not chosen:
         raise BadInput("motions", "no motion", "names of motions, or a body")
-    with known_errors.comparing(record, known, checks) as compare, time_limit(PATIENCE):
+    with known_errors.comparing(record, known, checks) as compare:
         (result,) = compare([_parity(_find_both(a, b), chosen, checks or CHECKS, tell)])
         return result
 
@@ -213,7 +221,8 @@ def _find_both(a: AnyBackEnd, b: AnyBackEnd) -> list[Runnable | tuple[str, Unusa
     found = list[Runnable | tuple[str, UnusableProgram]]()
     for subject, letter in ((a, "a"), (b, "b")):
         try:
-            found.append(find(subject, letter))
+            with time_limit(PATIENCE):  # programs start here, engines do not
+                found.append(find(subject, letter))
         except UnusableProgram as failure:
             found.append((str(subject), failure))
     first, second = (side.name if isinstance(side, Runnable) else side[0] for side in found)
@@ -232,15 +241,17 @@ def _parity(
 ) -> Verification:
     judged = list[Judged]()
     for k, side in enumerate(sides):
-        judged.append(_judge(side, motions, lambda what, k=k: tell(0.4 * k, what)))
+        with patience(side):
+            judged.append(_judge(side, motions, partial(tell, 0.4 * k)))
     names = [one.found.name for one in judged]
     together = f"{names[0]} and {names[1]}"
     rows, difference, curves = _compare(judged, motions, together)
     result = None
     if "order" in checks and (motion := choose(motions, lambda motion: all(_ran(one, motion) for one in judged))):
-        result = sweep(judged[0].found, judged[1].found, motion, lambda what: tell(0.8, what))
+        with patience(*sides):
+            result = sweep(judged[0].found, judged[1].found, motion, partial(tell, 0.8))
         for one, convergence in zip(judged, (result.first, result.second), strict=True):
-            one.findings.append(_order_finding(one.found, convergence))
+            one.findings.append(_order_finding(one.found, convergence, result.unit))
     made = [_verification(one, checks) for one in judged]
     between = [row.between for row in rows if row.between is not None]
     findings = [*made[0].findings, *made[1].findings, *(between if "parity" in checks else ())]
@@ -252,6 +263,12 @@ def _parity(
     notes = [f"{one.found.name}: {note}" for one in judged for note in one.notes]
     details = Parity(made[0], made[1], difference, tuple(rows), result, curves)
     return Verification(together, KIND, findings, which(a, b, difference, check=check), notes, details)
+
+
+def patience(*sides: Runnable | tuple[str, UnusableProgram]) -> AbstractContextManager[None]:
+    """Return a limit of the time of each answer if a side is a program, as in `verify_program`."""
+    of_program = any(isinstance(side, Runnable) and side.kind == Kind.PROGRAM for side in sides)
+    return time_limit(PATIENCE) if of_program else nullcontext()
 
 
 def _ran(judged: Judged, motion: Motion) -> bool:
@@ -313,83 +330,81 @@ def _measure(side: Runnable, motions: Sequence[Motion], tell: Callable[[str], ob
 
 
 def _compare(judged: Sequence[Judged], motions: Sequence[Motion], subject: str) -> tuple[list[Row], Difference, Curves | None]:
-    """Return the table, the largest difference relative to what is allowed, and errors over time."""
+    """Return the table, the largest difference, and errors over time in the motion that shows most."""
     by_case = [{finding.case: finding for finding in one.findings if finding.check == "motions"} for one in judged]
-    rows, largest, shown = (
-        list[Row](),
-        Difference(missing="no motion that both of them run"),
-        list[tuple[bool, float, Curves]](),
-    )
+    rows, shown, missing = list[Row](), list[tuple[Motion, Difference, Curves]](), "no motion that both of them run"
     for motion in motions:
-        runs = [one.ran.get(motion.name) for one in judged]
+        first, second = (one.ran.get(motion.name) for one in judged)
         finding = None
-        if all(run is not None and not run.ended for run in runs):
-            first, second = (run for run in runs if run is not None)
-            difference, curves = _difference(motion, first, second)
-            worse = 0 if difference.missing else difference.worse
+        if first is None or second is None or first.ended or second.ended:
+            if first is not None or second is not None:
+                finding = Finding(subject, "parity", motion.name, Verdict.NOT_TESTED, detail="one of them does not run it")
+        elif compared := _difference(motion, first, second):
+            difference, k = compared[0], compared[0].worse
             verdict = Verdict.RIGHT if difference.agrees else Verdict.WRONG
-            finding = Finding(
-                subject,
-                "parity",
-                motion.name,
-                Verdict.NOT_TESTED if difference.missing else verdict,
-                difference.error[worse],
-                difference.allowed[worse],
-                UNITS[worse],
-                "order",
-                detail=difference.missing,
-            )
-            if not difference.missing:
-                if largest.missing or _ratio(difference) > _ratio(largest):
-                    largest = difference
-                shown.append((motion.own, _ratio(difference), curves))
-            elif largest.missing:
-                largest = difference
-        elif any(run is not None for run in runs):
-            finding = Finding(subject, "parity", motion.name, Verdict.NOT_TESTED, detail="one of them does not run it")
-        if finding is not None or any(motion.name in found for found in by_case):
-            rows.append(Row(motion.name, by_case[0].get(motion.name), by_case[1].get(motion.name), finding))
-    best = max(shown, key=lambda each: each[:2], default=None)
-    return rows, largest, best[2] if best else None
+            sizes = difference.error[k], difference.allowed[k], UNITS[k]
+            finding = Finding(subject, "parity", motion.name, verdict, *sizes, by="order")
+            shown.append((motion, *compared))
+        else:
+            missing = "one has attitudes, the other one rates"
+            finding = Finding(subject, "parity", motion.name, Verdict.NOT_TESTED, detail=missing)
+        rows.append(Row(motion.name, by_case[0].get(motion.name), by_case[1].get(motion.name), finding))
+    if not shown:
+        return rows, Difference(missing=missing), None
+    most = max(shown, key=lambda each: (each[0].own, _ratio(each[1])))
+    return rows, _largest([difference for _, difference, _ in shown]), most[2]
 
 
 def _ratio(difference: Difference) -> float:
     return difference.error[difference.worse] / difference.allowed[difference.worse]
 
 
-def _difference(motion: Motion, first: Ran, second: Ran) -> tuple[Difference, Curves]:
-    """Return the difference between two runs of a motion, and errors over time."""
+def _largest(differences: Sequence[Difference]) -> Difference:
+    """Return the difference that is largest beside the allowed one, or if all are allowed, the largest one, of attitudes."""
+    worst = max(differences, key=_ratio)
+    turned = [difference for difference in differences if not math.isnan(difference.error[0])]
+    if not worst.agrees or not turned:
+        return worst
+    largest = max(turned, key=lambda difference: difference.error[0])
+    return replace(largest, error=(largest.error[0], math.nan))
+
+
+def _difference(motion: Motion, first: Ran, second: Ran) -> tuple[Difference, Curves] | None:
+    """Return the difference between two runs of a motion, and errors over time; None if they share no quantity."""
     data: list[States] = [in_body_axes(run.case.data, motion, run.motion) for run in (first, second)]
     scale, t = first.case.scale, first.case.t
     error = apart(data[0], data[1], scale)
     if all(math.isnan(x) for x in error):
-        missing = Difference(missing="one has attitudes, the other one rates")
-        return missing, Curves(motion.name, UNITS[0], t, *(run.case.error[0] for run in (first, second)), 0 * t)
+        return None
     allowed = first.allowed + second.allowed
-    # The shown quantity is the one in which they differ most, of those that both have.
     difference = Difference(error, (float(allowed[0]), float(allowed[1])), rows=len(t), common=True, case=motion.name)
     k = difference.worse
-    R, w = ([side[j] for side in data] for j in (0, 1))
-    with np.errstate(all="ignore"):
-        between = angle_between(*R) if k == 0 else np.linalg.norm(w[0] - w[1], axis=1) / scale  # type: ignore[operator]
-    at = float(t[int(np.argmax(between))])
-    return replace(difference, time=at), Curves(motion.name, UNITS[k], t, first.case.error[k], second.case.error[k], between)
+    a, b = (side[k] for side in data)
+    assert a is not None  # otherwise the error is nan
+    assert b is not None
+    between = angle_between(a, b) if k == 0 else np.linalg.norm(a - b, axis=1) / scale
+    columns = (tuple(map(float, values)) for values in (t, first.case.error[k], second.case.error[k], between))
+    return replace(difference, time=float(t[int(np.argmax(between))])), Curves(motion.name, UNITS[k], *columns)
 
 
-def _order_finding(found: Runnable, convergence: Any) -> Finding:
+def _order_finding(found: Runnable, convergence: Convergence, unit: str) -> Finding:
     """Return the finding on the convergence of a back end in the sweep."""
-    order, declared, error = convergence.order, found.order, convergence.error
-    text = sentence("it", convergence, "rad")
-    elsewhere = convergence.limit in (Limit.OTHER, Limit.NOTHING) and error > ELSEWHERE * (10 if found.single else 1)
-    slow = declared is not None and not order.reason and convergence.limit is Limit.EXACT and order.slope < declared - SLOPE
-    if convergence.limit is Limit.UNKNOWN:
-        verdict = Verdict.NOT_TESTED
-    else:
-        verdict = Verdict.WRONG if elsewhere or (slow and not found.single) else Verdict.RIGHT
-    if slow and verdict is Verdict.WRONG:
-        text += f", and {declared} was declared"
-    expected = math.nan if declared is None else float(declared)
-    return Finding(found.name, "order", "", verdict, order.slope, expected, "", "declared", detail=text)
+    order, declared = convergence.order, None if found.measured else found.order
+    slow = declared is not None and not found.single and order.slope < declared - SLOPE  # False for nan
+    elsewhere = convergence.limit in (Limit.OTHER, Limit.NOTHING)
+    verdict = Verdict.WRONG if elsewhere or slow else Verdict.RIGHT
+    text = sentence("it", convergence, unit) + f", and order {declared} was declared" * (slow and not elsewhere)
+    return Finding(
+        found.name,
+        "order",
+        "",
+        Verdict.NOT_TESTED if convergence.limit is Limit.UNKNOWN else verdict,
+        order.slope,
+        math.nan if declared is None else float(declared),
+        "",
+        "declared",
+        detail=text,
+    )
 
 
 def _verification(one: Judged, checks: Sequence[str]) -> Verification:
