@@ -33,6 +33,7 @@ from .motions.own import motion_of
 from .programs import (
     GENERIC,
     PATIENCE,
+    UNKNOWN,
     Answers,
     Named,
     Ran,
@@ -52,6 +53,8 @@ CHECKS = ("motions", "order", "parity")
 """Checks of two back ends: the exact motions of each, the convergence of each in a sweep of steps, and their difference."""
 KIND = "back ends"
 """`Verification.kind` of two back ends."""
+LISTED = 3
+"""Motions that a sentence names."""
 SLOPE = 0.5
 """Largest difference between the declared order and the measured one."""
 
@@ -410,15 +413,17 @@ def _order_finding(found: Runnable, convergence: Convergence, unit: str) -> Find
 def _verification(one: Judged, checks: Sequence[str]) -> Verification:
     """Return the verification of one back end by the checks."""
     kept = [finding for finding in one.findings if finding.check in (*checks, "protocol")]
-    reason = summary(
-        [finding for finding in kept if finding.check != "order"], one.named if "motions" in checks else [], one.limits
-    )
     if one.answers is None:
-        reason = one.findings[0].detail
-    wrong = [finding for finding in kept if finding.check == "order" and finding.verdict is Verdict.WRONG]
-    if wrong and not one.named:
-        reason = "; ".join([*(finding.detail for finding in wrong), *filter(None, [reason])])
-    return Verification(one.found.name, one.found.kind, kept, reason, one.notes)
+        return Verification(one.found.name, one.found.kind, kept, one.findings[0].detail)
+    some = [finding for finding in kept if finding.check != "order"]
+    reasons = [summary(some, *((one.named, one.limits) if "motions" in checks else ([], [])))]
+    wrong = [finding for finding in kept if finding.verdict is Verdict.WRONG]
+    if unknown := [finding.case for finding in wrong if finding.check == "motions" and not (finding.causes or finding.detail)]:
+        more = f" and {len(unknown) - LISTED} more" if len(unknown) > LISTED else ""
+        reasons.insert(0, f"{UNKNOWN} in {', '.join(unknown[:LISTED])}{more}")
+    if not one.named:
+        reasons = [finding.detail for finding in wrong if finding.check == "order"] + reasons
+    return Verification(one.found.name, one.found.kind, kept, "; ".join(filter(None, reasons)), one.notes)
 
 
 def _side(one: Judged, verification: Verification) -> Side:
