@@ -16,9 +16,9 @@ from conservative.errors import IntegrationFailed, Unsupported
 from conservative.grid import Grid
 from conservative.number_text import number, short_power
 
-from ..measures.convergence_order import Order, observed_order
+from ..measures.convergence_order import MIN_POINTS, Order, observed_order
 from .back_ends import Runnable
-from .compare import take_rows
+from .compare import ROUND_OFF, take_rows
 from .motions.motion import Motion
 from .programs import RESOLVED, Solve, in_principal_axes, is_generic
 from .solution import States, truth
@@ -34,6 +34,8 @@ CONVERGES = 0.5
 """Smallest order of a method that converges."""
 AT_ROUNDING, AT_TOLERANCE = 1e-5, 1e-3
 """Errors at the shortest step that rounding and tolerances of iterations explain, and the tolerance of a chosen step."""
+RATES_SHOW = 100.0
+"""Error of rates over the error of attitudes, at the shortest step, from which a sweep shows rates."""
 FEWER, BELOW = PARTS[:5], 0.3
 """Steps in 0.1 rad at which an order is measured without the exact motion, and how far it may be below a whole number."""
 
@@ -218,9 +220,10 @@ def sweep(first: Runnable, second: Runnable, motion: Motion, tell: Callable[[str
         runs.append([_run(side.solve, motion, side.principal, n) for n in PARTS])
     exact = truth(motion.scene, 0.0, np.array(motion.t))
     scale = float(np.linalg.norm(exact[1], axis=1).max()) or 1.0
-    # The quantity that shows more, of those that both have: rates in other axes do not change attitudes.
+    # Attitudes, unless rates show far more, such as rates in other axes, or one of both has no attitudes.
     finest = np.array([apart(some[-1], exact, scale) for some in runs])
-    part = int(np.argmax(np.where(np.isfinite(finest).all(axis=0), finest, -1).max(axis=0)))
+    turned, rates = np.where(np.isfinite(finest).all(axis=0), finest, -1.0).max(axis=0)
+    part = int(turned < 0 or rates > RATES_SHOW * max(turned, RESOLVED["f64"]))
 
     def error(data: States, of: States = exact) -> float:
         size = apart(data, of, scale)[part]
@@ -246,7 +249,9 @@ def sweep(first: Runnable, second: Runnable, motion: Motion, tell: Callable[[str
 def _convergence(
     runs: Sequence[States], part: int, steps: Sequence[float], errors: Sequence[float], side: Runnable
 ) -> Convergence:
-    made, order, last = changes(runs, part), observed_order(steps, errors), errors[-1]
+    made, last = changes(runs, part), errors[-1]
+    above = [size if size > ROUND_OFF else math.nan for size in errors]  # round-off would make the line bend
+    order = observed_order(steps, above if sum(map(math.isfinite, above)) >= MIN_POINTS else errors)
     own = own_order(steps, made, RESOLVED["f32" if side.single else "f64"])
     chooses = side.order is None and not side.measured  # its steps, by a tolerance that limits its error
     if math.isnan(last):

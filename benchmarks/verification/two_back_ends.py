@@ -265,7 +265,18 @@ def _parity(
     )
     notes = [f"{one.found.name}: {note}" for one in judged for note in one.notes]
     details = Parity(made[0], made[1], difference, tuple(rows), result, curves)
-    return Verification(together, KIND, findings, which(a, b, difference, check=check), notes, details)
+    reason = which(a, b, difference, check=check)
+    if result is not None and (a.verdict, b.verdict) == (Verdict.RIGHT, Verdict.RIGHT):
+        reason += _orders(names, result)
+    return Verification(together, KIND, findings, reason, notes, details)
+
+
+def _orders(names: Sequence[str], result: Sweep) -> str:
+    """Return which of two right back ends has which order, if the orders differ."""
+    orders = [side.order.slope for side in (result.first, result.second)]
+    if not abs(orders[0] - orders[1]) > SLOPE:  # False for nan
+        return ""
+    return "; " + ", ".join(f"{name} has order {order:.2f}" for name, order in zip(names, orders, strict=True))
 
 
 def patience(*sides: Runnable | tuple[str, UnusableProgram]) -> AbstractContextManager[None]:

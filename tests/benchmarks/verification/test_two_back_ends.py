@@ -1,7 +1,9 @@
 """Two back ends: the wrong one is named with its mistake, right ones are not accused, and settings are swept."""
 
+import ast
 import copy
 import json
+import runpy
 import shlex
 import sys
 from functools import partial
@@ -17,9 +19,11 @@ from conservative.benchmarks.verification.motions.motion import load
 from conservative.benchmarks.verification.motions.own import motion_of
 from conservative.benchmarks.verification.sweep import Limit, Series, measured_order, sentences
 from conservative.errors import BadInput, MissingEngine
+from conservative.number_text import number
 from conservative.references.worker.client import close_workers
 from conservative.reports.cli.main import main
 
+from ...pages import ROOT
 from ...sampling import sampled
 from . import planted_pairs, right_programs, wrong_programs
 
@@ -403,3 +407,70 @@ def test_the_command_refuses_by_name(words, message):
     done = invoke(*words)
     assert done.exit_code == 2
     assert message in done.output.replace("\n", " ")
+
+
+EXAMPLES = ROOT / "references" / "for_engine_authors" / "two_back_ends"
+PAGE = ROOT / "reports" / "documentation" / "two_back_ends.md"
+
+
+def example(name):
+    """Return the names of an example."""
+    return runpy.run_path(str(EXAMPLES / f"{name}.py"))
+
+
+def quoted():
+    """Return the sentences that the page quotes."""
+    lines = PAGE.read_text(encoding="utf-8").splitlines()
+    return "\n".join(line.removeprefix("> ") if line.startswith("> ") else "" for line in lines).replace("\n", " ")
+
+
+@pytest.mark.parametrize(
+    ("name", "functions", "rates", "right", "mistake"),
+    [
+        ("environment", ("environment", "wrapper"), "body", "environment", "world rates"),
+        ("unisim", ("first", "second"), "world", "first", "body rates"),
+    ],
+)
+def test_examples_are_judged_as_the_page_says(name, functions, rates, right, mistake):
+    made = example(name)
+    found = parity(*(BackEnd(made[each], rates=rates) for each in functions), only=["motions", "parity"])
+    assert found.reason in quoted()
+    assert [side.subject for side in (found.details.first, found.details.second) if side.verdict == "right"] == [right]
+    if mistake == "world rates":
+        declared = parity(made[functions[0]], BackEnd(made[functions[1]], rates="world"), motions=FEW, only="motions")
+        assert declared.verdict == "right"
+
+
+def test_basilisk_is_judged_as_the_page_says():
+    pytest.importorskip("Basilisk")
+    made = example("basilisk")
+    found = parity(made["hub"], made["scene"])
+    assert verdicts(found) == ("right", "wrong")
+    assert [finding.case for finding in found.details.second.findings if finding.verdict == "wrong"] == ["tiny_turned"]
+    orders = [side.order.slope for side in (found.details.sweep.first, found.details.sweep.second)]
+    assert orders == pytest.approx([4, 2], abs=0.1)
+
+
+def test_a_back_end_is_ten_lines():
+    """The most is 9 lines of code: what a user writes for an engine."""
+    for file, functions in {"environment": ("environment", "wrapper", "run"), "unisim": ("first", "second", "run")}.items():
+        tree = ast.parse((EXAMPLES / f"{file}.py").read_text(encoding="utf-8"))
+        of = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef)}
+        for name in functions:
+            assert of[name].end_lineno - of[name].lineno + 1 <= 12
+
+
+def test_the_sweep_of_the_page_is_measured():
+    """The numbers of the page, with their two digits; those below 1e-13 rad are round-off."""
+    found = parity("mujoco:RK4", "mujoco:implicitfast", motions=(), body="brick_flip")
+    steps, page = found.details.sweep.steps, PAGE.read_text(encoding="utf-8")
+    rows = [line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("| ") and line[2].isdigit()]
+    assert len(rows) == len(steps.values)
+    for row, step, *errors in zip(rows, steps.values, steps.first, steps.second, steps.between, strict=True):
+        assert float(row[0]) == pytest.approx(1e3 * step, rel=0.01)
+        for text, error in zip(row[1:], errors, strict=True):
+            assert error < 1e-13 if "below" in text else float(text) == pytest.approx(error, rel=0.03)
+    assert f"{number(steps.agree(1e-3) * 1e3)} ms" in page
+    assert steps.agree(1e-6) is None
+    picture = (ROOT / "reports" / "pictures" / "two_back_ends.svg").read_text(encoding="utf-8")
+    assert all(row["quantity"] in picture for row in found.details.rows())
