@@ -14,13 +14,20 @@ Tests of convergence, of any solver:
     cv.verification.assert_order([0.1, 0.05, 0.025, 0.0125], errors, order=4)
 """
 
+from typing import TYPE_CHECKING, Any
+
 from ..measures.convergence_order import Order, observed_order
 from .finding import CHECKS, Cause, Finding, Standing, Verdict, Verification
 from .order import OrderNotShown, OrderVerdict, assert_order, judge_order
 from .verify import Kind, kind_of, verify
 
+if TYPE_CHECKING:
+    from .back_ends import BackEnd
+    from .two_back_ends import parity
+
 __all__ = [
     "CHECKS",
+    "BackEnd",
     "Cause",
     "Finding",
     "Kind",
@@ -34,5 +41,19 @@ __all__ = [
     "judge_order",
     "kind_of",
     "observed_order",
+    "parity",
     "verify",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Return what needs kernels, which recordings do without."""
+    if name == "BackEnd":
+        from .back_ends import BackEnd
+
+        return BackEnd
+    if name == "parity":
+        from .two_back_ends import parity
+
+        return parity
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -155,12 +155,17 @@ CHECKS: Mapping[str, str] = MappingProxyType(
         "order": "the error falls with the step as the declared order says",
         "repeatability": "a second run has the same bits",
         "pairs": "two descriptions of one motion move equally",
+        "parity": "two back ends have the same motion",
         "times": "measured times are honest",
         "links": "mass and inertia of the links of a model file fit its shapes, their twins, and what a body can have",
         "bodies": "engines load the body that a model file describes",
     }
 )
 """The checks, and what each shows."""
+
+
+OF_TWO = ("recordings", "back ends")
+"""Kinds of verifications of two subjects: the reason says which one is wrong."""
 
 
 def join_verdicts(verdicts: Iterable[Verdict]) -> Verdict:
@@ -179,7 +184,8 @@ class Verification:
     Attributes
     ----------
     subject, kind
-        Name of the subject, and what it is: "recording", "recordings", "engine", "program", "method" or "model file".
+        Name of the subject, and what it is: "recording", "recordings", "engine", "program", "method", "model file", or
+        "back ends" for two of them.
     findings
         One for each case.
     reason
@@ -238,7 +244,7 @@ class Verification:
     @property
     def sentence(self) -> str:
         """The verdict in one sentence."""
-        if self.kind == "recordings":  # the reason says which one is wrong
+        if self.kind in OF_TWO:  # the reason says which one is wrong
             return f"{self.verdict}{self._standing}: {self.reason}"
         loaded = self.kind == "model file" and all(finding.check == "bodies" for finding in self.findings)
         subject = f"The loading of {self.subject}" if loaded else self.subject

@@ -19,15 +19,17 @@ from __future__ import annotations
 
 import csv
 import math
+import os
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TextIO
 
 from conservative import registry
 from conservative.errors import BadInput
-from conservative.files import read_bytes
+from conservative.files import read_bytes, text_file
 
 from ..measures.sentence import SAME_ERROR, SAME_ORDER, change_of
 from .finding import CHECKS, Finding, MotionFinding, Settings, Standing, Verdict, Verification
@@ -150,6 +152,33 @@ def _number(text: str) -> float:
     return number
 
 
+@contextmanager
+def comparing(
+    record: str | os.PathLike[str] | None, known: str | os.PathLike[str] | None, only: Collection[str], some_pairs: bool = False
+) -> Iterator[Callable[[list[Verification]], list[Verification]]]:
+    """Yield the comparison of results with a file of known errors, which is read, or opened for writing, before any work.
+
+    Without a file, results stay as they are. `only` and `some_pairs` are arguments of `compare`.
+    """
+    if record is not None and known is not None:
+        raise BadInput("record", "a file to write and a file to compare with", "one of them")
+    if known is not None:
+        blocks = read(Path(known))
+        yield lambda results: compare(results, blocks, only, some_pairs)
+    elif record is not None:
+        require_own(Path(record))
+        with text_file(Path(record), "record") as stream:
+
+            def write_all(results: list[Verification]) -> list[Verification]:
+                new = blocks_of(results)
+                write(stream, new)
+                return compare(results, new, only, some_pairs)
+
+            yield write_all
+    else:
+        yield lambda results: results
+
+
 def require_own(path: Path) -> None:
     """Raise `BadInput` if a file exists that is not a file of known errors."""
     if not path.is_file() or not path.stat().st_size:
@@ -196,7 +225,8 @@ def _block(verification: Verification) -> Block:
         if finding.check == "protocol" and _is_wrong(finding):
             raise BadInput("record", f"{verification.subject!r}, which does not answer: {finding.detail}", _RUNS)
         if finding.check == "order":
-            block.order = finding.error
+            if finding.subject == verification.subject:  # two back ends have two orders, and are compared by their motions
+                block.order = finding.error
             continue
         key, case = key_of(verification, finding), Case(_errors(finding), _mistakes(finding))
         if finding.verdict is Verdict.RIGHT and not _is_right(case, _allowed(finding)):
@@ -319,7 +349,10 @@ def _compare_all(verification: Verification, block: Block, only: Collection[str]
     ) or any(finding.check == "repeatability" and _is_wrong(finding) for finding in verification.findings)
     for finding in verification.findings:
         was = left.pop(key_of(verification, finding), None)
-        findings.append(_compare_order(finding, block.order) if finding.check == "order" else _compare(finding, was, random))
+        if finding.check == "order":
+            findings.append(_compare_order(finding, block.order) if finding.subject == verification.subject else finding)
+        else:
+            findings.append(_compare(finding, was, random))
     if any(finding.check == "protocol" and _is_wrong(finding) for finding in findings):  # nothing else was tested
         return findings
     for check, name in left:

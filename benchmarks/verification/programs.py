@@ -34,7 +34,7 @@ from conservative.trajectory import Trajectory
 
 from ..studies.selection import bits_of
 from . import protocol
-from .compare import Compared, compare_answers
+from .compare import Compared, compare_answers, take_rows
 from .explain import PROGRAM_KINDS, diagnose
 from .explanation import HALF, OWN_ERROR, Explanation
 from .finding import Cause, Finding, MotionFinding, Settings, Verdict, Verification, uncapitalised
@@ -82,7 +82,22 @@ TURN, TURNS = "fast_turn", (2.0, 2.5)
 installed, or to pi / 2."""
 EQUAL = 1e-6
 """Largest relative difference of two turns that are the same limit. Two steps of any method differ by far more."""
-Solve = Callable[[Scene, Grid], Trajectory]
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Samples at times t (n,), s: attitudes (n, 3, 3) and rates (n, 3), rad/s, body axes. One of the two can be None.
+
+    `failure` is the reason if samples are missing.
+    """
+
+    t: Array
+    R_WB: Array | None
+    w_WB_B: Array | None
+    failure: IntegrationFailed | None = None
+
+
+Solve = Callable[[Scene, Grid], Trajectory | Samples]
 """Integrates a scene. It raises `Unsupported` or `IntegrationFailed`; its samples need not be plausible."""
 
 
@@ -138,18 +153,19 @@ def run_motion(solve: Solve, motion: Motion, allowed: Array, parts: int = FINE) 
     thin = max(n for n in range(1, every + 1) if every % n == 0 and n * motion.samples <= max(ROWS, motion.samples))
     grid = Grid(motion.step / parts, every * motion.samples, every // thin)
     scene, ended = motion.scene, ""
+    answer: Trajectory | Samples
     try:
-        trajectory = solve(scene, grid)
-        t, R, w, failure = trajectory.t, trajectory.R_WB, trajectory.w_WB_B, trajectory.failure
+        answer = solve(scene, grid)
     except Unsupported:
         raise
     except IntegrationFailed as ended_early:
-        t, R, w, failure = np.zeros(0), np.zeros((0, 3, 3)), np.zeros((0, 3)), ended_early
+        answer = Samples(np.zeros(0), np.zeros((0, 3, 3)), np.zeros((0, 3)), ended_early)
+    t, failure, data = answer.t, answer.failure, (answer.R_WB, answer.w_WB_B)
     if len(t) < grid.n_samples:
         ended = f"the run ended early: {failure.outcome if failure else 'samples are missing'}"
-    elif not (np.isfinite(R).all() and np.isfinite(w).all()):
+    elif not all(x is None or np.isfinite(x).all() for x in data):
         ended = "samples are not finite"
-    case = compare_answers(scene, t[1:], (R[1:], w[1:]), allowed, grid.dt)
+    case = compare_answers(scene, t[1:], take_rows(data, slice(1, None)), allowed, grid.dt)
     at = slice(thin - 1, None, thin)  # the samples of the motion
     error = np.full(2, np.inf) if ended else case.error[:, at].max(axis=1)
     return Ran(motion, case, error, allowed, grid.dt, ended, isinstance(failure, EngineTimeout))
@@ -171,6 +187,11 @@ class Answers:
         return [run for run in self.ran if not run.ratio <= 1]
 
 
+def motions_of(seed: int | None) -> Sequence[Motion]:
+    """Return the published motions (None), or the fresh motions of a seed."""
+    return load() if seed is None else of_seed(seed)
+
+
 def run_motions(
     solve: Solve,
     order: int | None,
@@ -179,16 +200,18 @@ def run_motions(
     unsupported: Callable[[Scene], str | None] = lambda scene: None,
     tell: Callable[[str], object] = lambda what: None,
     seed: int | None = None,
+    motions: Sequence[Motion] | None = None,
 ) -> Answers:
-    """Run the published motions, or those of a seed, in principal axes of their bodies for a subject that gets no others.
+    """Run the published motions, those of a seed, or others.
 
-    `unsupported` returns why a scene is not supported, None if it is.
+    A subject that gets `principal` axes only runs them in the principal axes of their bodies. `unsupported` returns why a scene
+    is not supported, None if it is.
     """
     ran, reasons = list[Ran](), dict[str, str]()
-    for original in load() if seed is None else of_seed(seed):
+    for original in motions_of(seed) if motions is None else motions:
         tell(original.name)
         motion = in_principal_axes(original) if principal else original
-        allowed = np.array(tolerance(motion, order, single))
+        allowed = np.array(tolerance(original, order, single))
         if sum(run.hangs for run in ran) == HANGS:
             reasons[motion.name] = f"it did not answer in {HANGS} motions before"
             continue
@@ -217,7 +240,7 @@ def measure_order(answers: Answers) -> float:
     The slope of a motion is the slope between its two finest steps whose errors are above round-off.
     """
     slopes, floor = [], RESOLVED["f32" if answers.single else "f64"]
-    free = [run for run in answers.ran if not run.motion.features and _is_generic(run.motion)]
+    free = [run for run in answers.ran if not run.motion.features and is_generic(run.motion)]
     for run in free[:GENERIC]:
         errors = [float(run_motion(answers.solve, run.motion, run.allowed, n).error[0]) for n in LADDER]
         good = [(n, error) for n, error in zip(LADDER, errors, strict=True) if floor < error < ASYMPTOTIC]
@@ -272,7 +295,7 @@ def explain_motions(failing: Sequence[Ran], right: Sequence[Ran] = ()) -> list[N
 
 def _rank(ran: Ran) -> tuple[bool, bool, float]:
     """Return the place in the search: free bodies with three moments first, then by how clear and how small the error is."""
-    return bool(ran.motion.features), not _is_generic(ran.motion), abs(math.log10(ran.ratio) - CLEAR)
+    return bool(ran.motion.features), not is_generic(ran.motion), abs(math.log10(ran.ratio) - CLEAR)
 
 
 def _turns(ran: Ran) -> int:
@@ -318,7 +341,7 @@ def _apply(explanation: Explanation, failing: Sequence[Ran], right: Sequence[Ran
     return Applied(best, tuple(names), len(names) - refuted, float(np.mean(shares)) if shares else math.inf)
 
 
-def _is_generic(motion: Motion) -> bool:
+def is_generic(motion: Motion) -> bool:
     """Return whether the three principal moments differ by more than a thousandth of the largest."""
     moments = np.sort(motion.scene.body.moments)
     return bool((np.diff(moments) > 1e-3 * moments[-1]).all())
@@ -379,6 +402,15 @@ def motion_findings(subject: str, answers: Answers) -> tuple[list[Finding], list
     return findings, named, order
 
 
+def judge_motions(subject: str, answers: Answers) -> tuple[list[Finding], list[Named], list[str], float]:
+    """Return what `motion_findings` returns, and sentences on what only long steps show, before the order."""
+    findings, named, order = motion_findings(subject, answers)
+    limited = turn_finding(subject, answers)
+    if limited is None:
+        return findings, named, [], order
+    return [*findings, limited], named, [uncapitalised(limited.causes[0].sentence)], order
+
+
 def _pair(values: Array) -> tuple[float, float]:
     return float(values[0]), float(values[1])
 
@@ -417,10 +449,11 @@ def turn_finding(subject: str, answers: Answers) -> Finding | None:
             trajectory = answers.solve(scene, Grid(turn / speed, 1, 1))
         except (Unsupported, IntegrationFailed):
             return None
+        R, w = trajectory.R_WB, trajectory.w_WB_B
         if len(trajectory.t) < 2:
             return None
-        turned[k] = float(angle_between(trajectory.R_WB[:1], trajectory.R_WB[1:2])[0])
-        spun[k] = float(np.linalg.norm(trajectory.w_WB_B[1])) / speed * turn
+        turned[k] = math.nan if R is None else float(angle_between(R[:1], R[1:2])[0])
+        spun[k] = math.nan if w is None else float(np.linalg.norm(w[1])) / speed * turn
     limits = [
         float(values[0]) if abs(values[1] - values[0]) <= EQUAL * values[0] and values[0] < (1 - EQUAL) * TURNS[0] else math.nan
         for values in (turned, spun)
@@ -512,11 +545,7 @@ def verify_method(
             seed,
         )
         if "motions" in checks:
-            some, named, order = motion_findings(subject, answers)
-            findings += some
-            if (limited := turn_finding(subject, answers)) is not None:
-                findings.append(limited)
-                limits.append(uncapitalised(limited.causes[0].sentence))
+            findings, named, limits, order = judge_motions(subject, answers)
         if "order" in checks and not named:
             order = measure_order(answers) if math.isnan(order) else order
             findings.append(order_finding(subject, answers, order))

@@ -6,7 +6,6 @@ import os
 import re
 import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
@@ -17,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 from conservative import registry
 from conservative.check import choice
 from conservative.errors import BadInput
-from conservative.files import text_file
 from conservative.programs import list_programs
 from conservative.scene import Scene
 
@@ -232,36 +230,12 @@ def verify(
         allowed = ", ".join(dict.fromkeys(check for kind in kinds for check in CHECKS_OF[kind]))
         raise BadInput("only", repr(sorted(unused)[0]), f"checks of {' and '.join(sorted(kinds))}: {allowed}")
     _refuse_left_out(only, bodies=("engines", engines), pairs=("pairs", pairs))
-    _require_motions(seed, only, record or known)
-    with _known_errors(record, known, only, bool(pairs)) as compare:
-        folders = [*search, *_packages(listed)]
-        return compare(_verify_all(expanded, methods, body, engines, only, pairs, folders, start, error, seed, tell, reading))
-
-
-@contextmanager
-def _known_errors(
-    record: str | os.PathLike[str] | None, known: str | os.PathLike[str] | None, only: Sequence[str], some_pairs: bool
-) -> Iterator[Callable[[list[Verification]], list[Verification]]]:
-    """Yield the comparison of results with a file of known errors, which is read, or opened for writing, before any work."""
+    require_motions(seed, only, record or known)
     from . import known as known_errors  # here: most commands have no such file
 
-    if record is not None and known is not None:
-        raise BadInput("record", "a file to write and a file to compare with", "one of them")
-    if known is not None:
-        blocks = known_errors.read(Path(known))
-        yield lambda results: known_errors.compare(results, blocks, only, some_pairs)
-    elif record is not None:
-        known_errors.require_own(Path(record))
-        with text_file(Path(record), "record") as stream:
-
-            def write(results: list[Verification]) -> list[Verification]:
-                new = known_errors.blocks_of(results)
-                known_errors.write(stream, new)
-                return known_errors.compare(results, new, only, some_pairs)
-
-            yield write
-    else:
-        yield lambda results: results
+    with known_errors.comparing(record, known, only, bool(pairs)) as compare:
+        folders = [*search, *_packages(listed)]
+        return compare(_verify_all(expanded, methods, body, engines, only, pairs, folders, start, error, seed, tell, reading))
 
 
 def _verify_all(
@@ -305,7 +279,7 @@ def _packages(subjects: Sequence[Any]) -> list[Path]:
     return list(dict.fromkeys([*folders, *inside]))
 
 
-def _require_motions(seed: int | None, only: Sequence[str], known: str | os.PathLike[str] | None) -> None:
+def require_motions(seed: int | None, only: Sequence[str], known: str | os.PathLike[str] | None) -> None:
     """Raise `BadInput` for a seed that is not one, that no check uses, or that is given with a file of known errors."""
     if seed is None:
         return

@@ -184,6 +184,23 @@ def recorded(rows: pd.DataFrame, name: str, limits: Mapping[str, float]) -> Any:
     return apply_style(alt.vconcat(*panels))
 
 
+def two_back_ends(rows: pd.DataFrame, motion: str) -> Any:
+    """Return the errors of two back ends and the difference between them over time: columns t, quantity and value."""
+    shown = rows.assign(shown=rows["value"].clip(lower=FLOOR))
+    names = list(dict.fromkeys(shown["quantity"]))
+    shown, x = _over_time(shown)
+    colour = alt.Color(
+        "quantity:N",
+        scale=alt.Scale(domain=names, range=[PALETTE[name] for name in ("blue", "vermilion", "grey")]),
+        sort=names,
+        legend=alt.Legend(title=None, orient="bottom", columns=1, labelLimit=400),
+    )
+    dash = alt.StrokeDash("quantity:N", scale=alt.Scale(domain=names, range=[[1, 0], [1, 0], [6, 4]]), sort=names, legend=None)
+    y = alt.Y(**log_channel("shown", "size", shown["shown"]))
+    chart = alt.Chart(shown, width=2 * WIDTH - 180, height=HEIGHT, title=f"Two back ends: {motion}")
+    return apply_style(chart.mark_line(strokeWidth=2).encode(x=x, y=y, color=colour, strokeDash=dash))
+
+
 def growth(lines: pd.DataFrame) -> Any:
     """Return the largest error so far over time; rows of panels are quantities, columns scenes. Columns as in `long_time`."""
     data = lines.assign(shown=lines["value"].clip(lower=FLOOR))

@@ -45,9 +45,14 @@ FILES = {
     "errors.csv": "t,quantity,value",
     "errors.svg": SVG_MARK,
 }
-"""The files of `--out`, and how each begins. Only model files have a page, and only a recording has errors over time."""
+"""The files of `--out`, and how each begins. Only model files have a page, and only a recording and --pairs have errors over
+time."""
 MARK = "# Known errors on exact motions."
 """The beginning of a file of known errors (`known.MARK`, which `--help` does not import)."""
+TWO = "subjects"
+"""The value of --pairs without names, which compares two subjects with each other."""
+WITH_TWO = ("pairs", "only", "body", "seed", "record", "known", "picture")
+"""Options of two subjects that are compared with each other, beside those of the output."""
 LISTS = ("only", "pairs", "engines")
 """Options that take names between commas."""
 
@@ -65,6 +70,7 @@ LISTS = ("only", "pairs", "engines")
         "conservative verify a.csv b.csv                                 the same, if nobody knows the body: it rotates freely",
         "conservative verify ./my_engine 'python my_engine.py'           programs",
         "conservative verify mujoco@3.12.0 drake:discrete                engines",
+        "conservative verify mujoco:RK4 pinocchio --pairs                two back ends differ: which one is wrong?",
         "conservative verify ./my_engine --seed 7                        by motions that nobody has seen",
         "conservative verify ./my_engine --record known.txt              its errors are known, later ones fail:",
         "conservative verify ./my_engine --known known.txt",
@@ -116,7 +122,15 @@ LISTS = ("only", "pairs", "engines")
     "bodies.  [default: all]",
     "CHECKS",
 )
-@names_option("pairs", "Engines and programs: pairs of descriptions to compare.  [default: all]")
+@option(
+    "pairs",
+    "Without names, after two engines, methods or programs: which of them is wrong? With names: pairs of descriptions of one "
+    "body to compare.  [default: all]",
+    multiple=True,
+    is_flag=False,
+    flag_value=TWO,
+    metavar="[A,B]",
+)
 @click.option(
     "--seed",
     type=click.IntRange(0),
@@ -151,7 +165,7 @@ LISTS = ("only", "pairs", "engines")
 @click.option("--csv", type=Output(FILES["verify.csv"]), help="Write the findings as CSV.")
 @option(
     "out",
-    f"Write {', '.join(FILES)} into this folder; the page only for model files, errors only for a recording.",
+    f"Write {', '.join(FILES)} into this folder; the page only for model files, errors only for a recording or --pairs.",
     type=Output(FILES),
 )
 @picture_option
@@ -174,8 +188,8 @@ def verify(
     A SUBJECT is a recording (CSV or JSON lines), an engine with a version or a setting, a method of this package, a program
     (its name, its file, or a quoted command line), a model file (URDF, SDF, MJCF, USD), or a folder of recordings or of model
     files. A folder without such files stands for the models in the folders below it. Two recordings are also compared with each
-    other. The links of model files are checked without an engine. With --engines and no SUBJECT, engines load the small model
-    files of this package, each of which tests one rule of a format.
+    other, and two engines, methods or programs with --pairs. The links of model files are checked without an engine. With
+    --engines and no SUBJECT, engines load the small model files of this package, each of which tests one rule of a format.
 
     The exit code is 0 if all subjects are right, 1 if one is wrong, and 3 if one is undecided or not tested. With --known, it
     is 1 only if an error is larger than in the file, has another mistake without being smaller, or is new. If a motion changed,
@@ -197,13 +211,16 @@ def verify(
         names = [str(CATALOGUE)]
     kinds_in_order = [subject.kind for subject in expand(names)]
     kinds, alone = set(kinds_in_order), kinds_in_order == [Kind.RECORDING]
-    options = used({"picture": picture, "scripts": scripts, **values}, kinds)
+    together = TWO in values["pairs"]
+    given = {"picture": picture, "scripts": scripts, **values}
+    options = used_by_two(given, names) if together else used(given, kinds)
     if not subjects:  # the masses of the small files are no robot's
         options.setdefault("only", ["bodies"])
-    if picture is not None and not alone:
-        raise BadInput("picture", f"{len(kinds_in_order)} subjects", "one recording")
-    drawn = alone and find_spec("pandas") is not None and find_spec("altair") is not None
-    left_out = [] if drawn else ["errors.svg"] if alone else ["errors.svg", "errors.csv"]
+    over_time = alone or together
+    if picture is not None and not over_time:
+        raise BadInput("picture", f"{len(kinds_in_order)} subjects", "one recording, or two subjects with --pairs")
+    drawn = over_time and find_spec("pandas") is not None and find_spec("altair") is not None
+    left_out = [] if drawn else ["errors.svg"] if over_time else ["errors.svg", "errors.csv"]
     if Kind.MODEL not in kinds:
         left_out.append("verify.html")
     elif out is not None:
@@ -211,7 +228,7 @@ def verify(
     outputs = {"junit": junit, "markdown": markdown, "csv": csv, "picture": picture}
     title = f"verifying {', '.join(names)}"
     with output_files(out, [name for name in FILES if name not in left_out], **outputs) as write, progress(title) as tell:
-        verifications = verify(names, tell=tell, **options)
+        verifications = [verify_two(*names, tell=tell, **options)] if together else verify(names, tell=tell, **options)
         made = {
             "csv": lambda: section.findings_text(verifications),
             "errors.csv": lambda: section.errors_text(verifications),
@@ -253,6 +270,34 @@ def used(values: Mapping[str, Any], kinds: Collection[Kind]) -> dict[str, Any]:
     return options
 
 
+def verify_two(first: str, second: str, **options: Any) -> Verification:
+    """Return the verification of two back ends."""
+    from conservative.benchmarks.verification import parity  # here: recordings need no kernels
+
+    return parity(first, second, **options)
+
+
+def used_by_two(values: Mapping[str, Any], names: Sequence[str]) -> dict[str, Any]:
+    """Return the options of two back ends on the command line as `parity` takes them. Raise `BadInput` for others."""
+    ctx = click.get_current_context()
+    if len(names) != 2:
+        got = f"--pairs without names, and {len(names)} subjects ({', '.join(names)})"
+        raise BadInput(
+            "pairs", got, "two subjects before --pairs, or names of pairs of descriptions, such as --pairs 'mass x 10^k'"
+        )
+    if values["pairs"] != (TWO,):
+        raise BadInput("pairs", "--pairs without names and with names", "one of them")
+    given = {name: value for name, value in values.items() if ctx.get_parameter_source(name) is not ParameterSource.DEFAULT}
+    for name in given:
+        if name not in WITH_TWO:
+            flag = next(param.opts[0] for param in ctx.command.params if param.name == name)
+            got = f"{flag}, which two subjects with --pairs do not use"
+            raise BadInput(flag.lstrip("-"), got, f"one of {', '.join(f'--{other}' for other in WITH_TWO)}")
+    if "only" in given:
+        given["only"] = split_names("only", given["only"])
+    return {name: value for name, value in given.items() if name not in ("pairs", "picture")}
+
+
 def facts() -> dict[str, str]:
     """Return the machine and the versions that runs were made with; a recording has none."""
     from ..run.provenance import provenance  # here: numba takes a second
@@ -261,13 +306,17 @@ def facts() -> dict[str, str]:
 
 
 def draw(verifications: Sequence[Verification], path: Path | None = None) -> bytes:
-    """Return errors and drifts of a recording over time, with their limits, in the format of a file, by default SVG."""
+    """Return errors of a recording or of two back ends over time, in the format of a file, by default SVG."""
     import pandas as pd
 
     from ..charts import figures
 
     (recording,) = verifications
     details: Any = recording.details
+    if recording.kind == "back ends":
+        if details.curves is None:
+            raise BadInput("picture", f"{recording.subject}, which have no common motion", "two subjects that run one motion")
+        return picture_file(figures.two_back_ends(pd.DataFrame(details.rows()), details.curves.motion), path)
     limits = {quantity.name: quantity.allowed for quantity in details.quantities if math.isfinite(quantity.allowed)}
     return picture_file(figures.recorded(pd.DataFrame(details.rows()), recording.subject, limits), path)
 

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
-from conservative.benchmarks.verification.finding import EXIT_CODES, Cause, Finding, Standing, Verdict, Verification
+from conservative.benchmarks.verification.finding import EXIT_CODES, OF_TWO, Cause, Finding, Standing, Verdict, Verification
 
 from ..document.cells import DASH, bound, listed
 from ..document.model import Block, Cell, Check, Document, Emphasis, Grade, Item, Items, Paragraph, Row, Section, Table, filled
@@ -50,7 +50,11 @@ COLUMNS = (
     "change",
 )
 """Columns of findings as CSV."""
-OWN: Mapping[str, Callable[[Verification], Sequence[Block]]] = {"recording": recording_blocks, "recordings": two_blocks}
+OWN: Mapping[str, Callable[[Verification], Sequence[Block]]] = {
+    "recording": recording_blocks,
+    "recordings": two_blocks,
+    "back ends": lambda verification: _back_end_blocks(verification),
+}
 """Blocks of kinds of subjects that have other data than cases, by `Verification.kind`."""
 MODEL = "model file"
 """The kind of subjects that are shown together, in a table of files and engines."""
@@ -70,7 +74,7 @@ def build(verifications: Sequence[Verification], made: Mapping[str, str] | None 
     sentences = [
         Item(
             f"{verification.sentence}.",
-            verification.subject * (verification.kind == "recordings"),
+            verification.subject * (verification.kind in OF_TWO),
             verification.verdict is Verdict.WRONG,
         )
         for verification in listed_alone
@@ -100,7 +104,11 @@ def build(verifications: Sequence[Verification], made: Mapping[str, str] | None 
             "made": dict(made or {}),
             "subjects": [content(verification) for verification in verifications],
         },
-        checks=[_check(verification.subject, finding) for verification in verifications for finding in verification.findings],
+        checks=[
+            _check(finding.subject if verification.kind in OF_TWO else verification.subject, finding)
+            for verification in verifications
+            for finding in verification.findings
+        ],
         failures=[f"{verification.sentence}." for verification in order if verification.exit_code == EXIT_CODES[Verdict.WRONG]],
     )
 
@@ -171,6 +179,12 @@ def details(verification: Verification) -> list[Block]:
     tables = [_cases(check, some) for check, some in grouped(others, lambda finding: finding.check)]
     right = _pair_blocks(pairs) if all(pair.verdict is not Verdict.WRONG for pair in pairs) else []
     return filled(*summary(verification), *tables, *right)
+
+
+def _back_end_blocks(verification: Verification) -> list[Block]:
+    from .two_back_ends import back_end_blocks  # here: it needs kernels, which recordings do without
+
+    return back_end_blocks(verification)
 
 
 def _pair_blocks(findings: Sequence[Finding]) -> list[Block]:

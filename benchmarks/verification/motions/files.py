@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -132,10 +132,15 @@ def tolerance(motion: Motion, order: int | None, single: bool = False) -> tuple[
     """Return the largest allowed errors of a program of an order at |w| h = 0.01: of the attitude, rad, and relative, of rates.
 
     Order 3 and a program that chooses its steps (None) have the tolerances of order 2. Published motions have those of their
-    files, and fresh ones those that are measured with the same motion in the axes of the seed.
+    files. Fresh ones, and those of a user's body, have tolerances that are measured here, in the axes of the given motion.
     """
     order = tested_order(order)
-    attitude, rates, more = _published(motion.name, order) if motion.seed is None else _limits(motion.seed)[motion.name, order]
+    if motion.own:
+        attitude, rates, more = _own_limits(motion)[motion.name, order]
+    elif motion.seed is not None:
+        attitude, rates, more = _limits(motion.seed)[motion.name, order]
+    else:
+        attitude, rates, more = _published(motion.name, order)
     return (attitude + more, rates + more) if single else (attitude, rates)
 
 
@@ -148,7 +153,16 @@ def _published(name: str, order: int) -> tuple[float, float, float]:
 @cache
 def _limits(seed: int) -> dict[tuple[str, int], tuple[float, float, float]]:
     """Return the tolerances of attitude and rates, and what single precision may add, by motion of a seed and order."""
-    motions, limits = search.fresh(seed), dict[tuple[str, int], tuple[float, float, float]]()
+    return _measured(search.fresh(seed))
+
+
+@lru_cache(maxsize=16)
+def _own_limits(motion: Motion) -> dict[tuple[str, int], tuple[float, float, float]]:
+    return _measured([motion])
+
+
+def _measured(motions: Sequence[Motion]) -> dict[tuple[str, int], tuple[float, float, float]]:
+    limits = dict[tuple[str, int], tuple[float, float, float]]()
     for motion, measured in zip(motions, measure(motions, PARTS[-1:]), strict=True):
         for (order, _), tolerances in measured.tolerances.items():
             attitude, rates = map(_short, tolerances[:2])

@@ -37,7 +37,7 @@ class Motion:
     """A motion of the catalogue, in SI units: `step` is the time in which it turns by about 0.1 rad.
 
     There are `samples` samples after the start, each after `steps` of these steps. `inertia` has xx, yy, zz, xy, xz and yz.
-    `seed` is the seed of a fresh motion (see `search`), None for a published one.
+    `seed` is the seed of a fresh motion (see `search`), None for a published one. `own` is True for the body of a user.
     """
 
     name: str
@@ -56,6 +56,7 @@ class Motion:
     com_B: Sequence[float] | None = None
     orbit: float | None = None
     seed: int | None = None
+    own: bool = False
 
     @property
     def features(self) -> list[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -11,12 +10,12 @@ from scipy.spatial.transform import Rotation
 
 from conservative.attitude import Array, angle_between
 from conservative.errors import BadInput
-from conservative.number_text import number
 from conservative.scene import Scene
 
 from ..compare import Compared, differ
 from ..finding import Finding, Verdict, Verification
 from ..solution import States, truth
+from ..which import Difference, Side, which
 from .comparison import Rows, prepare
 from .table import Recording
 from .verdict import UNITS, verify_recording
@@ -30,33 +29,6 @@ BODIES = {"another body", "other moments"}
 """Keys of mistakes of the body. If both recordings have one, `--body` names the wrong body, and the recordings may be right."""
 Named = tuple[str, Recording]
 """A recording and the name of its file."""
-
-
-@dataclass(frozen=True)
-class Difference:
-    """The largest difference between two recordings, `error`: of attitudes in rad, and of rates relative to the largest rate.
-
-    A quantity that one of them does not have is nan. Digits, noise and the interpolation between rows decide what is `allowed`.
-    `rows` is the number of rows that were compared, `common` is True if both files have rows at these times, and `missing` is
-    the reason if nothing was compared.
-    """
-
-    error: tuple[float, float] = (math.nan, math.nan)
-    allowed: tuple[float, float] = (math.nan, math.nan)
-    time: float = math.nan
-    rows: int = 0
-    common: bool = False
-    missing: str = ""
-
-    @property
-    def worse(self) -> int:
-        """The quantity with the larger ratio of difference and allowed difference: 0 for attitudes, 1 for rates."""
-        return int(np.nanargmax(np.divide(self.error, self.allowed)))
-
-    @property
-    def agrees(self) -> bool:
-        """True if the difference is allowed."""
-        return not self.missing and self.error[self.worse] <= self.allowed[self.worse]
 
 
 @dataclass(frozen=True)
@@ -158,37 +130,19 @@ def join(
 
 def _reason(a: Verification, b: Verification, difference: Difference, relation: str, decides: str) -> str:
     """Return which of two recordings is wrong, and by which mistake."""
-    size = "" if difference.missing else f"{number(difference.error[difference.worse])} {UNITS[difference.worse]}"
-    both = (a.verdict, b.verdict)
-    (first,), (second,) = a.findings, b.findings
-    if both == (Verdict.RIGHT, Verdict.RIGHT):
-        if difference.missing:
-            return f"both are right; they are not compared with each other: {difference.missing}"
-        if difference.agrees:
-            return f"both are right, and differ by at most {size}"
-        how = f"{b.subject} has the motion of {a.subject} {relation}" if relation else "from different starts"
-        return f"both are motions of this body, {how}: they differ by {size} at {difference.time:g} s{decides}"
-    if both == (Verdict.WRONG, Verdict.WRONG):
-        same = bool(first.mistake) and first.mistake == second.mistake
-        if difference.agrees and (not same or first.mistake in BODIES):
-            return (
-                f"both have the same motion (they differ by at most {size}), but not the motion of this body: check --body. "
-                f"{a.subject}: {a.reason}"
-            )
-        if same:
-            numbers = (
-                "" if first.causes[0].sentence == second.causes[0].sentence else f" ({b.subject}: {second.causes[0].sentence})"
-            )
-            return f"both are wrong by the same mistake: {first.causes[0].sentence}{numbers}"
-    return ". ".join(
-        f"{verification.subject} is {verification.verdict}: {verification.reason}"
-        for verification in sorted((a, b), key=_order)
+    how = f"{b.subject} has the motion of {a.subject} {relation}" if relation else "from different starts"
+    differ = f"both are motions of this body, {how}: they differ by {difference.size} at {difference.time:g} s{decides}"
+    check = (
+        f"both have the same motion (they differ by at most {difference.size}), but not the motion of this body: check --body. "
+        f"{a.subject}: {a.reason}"
     )
+    return which(_side(a), _side(b), difference, differ, check, BODIES)
 
 
-def _order(verification: Verification) -> bool:
-    """Sort right recordings before others."""
-    return verification.verdict is not Verdict.RIGHT
+def _side(verification: Verification) -> Side:
+    (finding,) = verification.findings
+    sentence = finding.causes[0].sentence if finding.mistake else ""
+    return Side(verification.subject, verification.verdict, verification.reason, finding.mistake, sentence)
 
 
 def _labelled(tell: Callable[[str], object], name: str) -> Callable[[str], object]:

@@ -56,6 +56,7 @@ FINDINGS = {
     "pair that crashes": PairFinding("a", "pairs", "top: mass x 2^k", WRONG, INF, 1e-9),
     "pair that is right by its limit": PairFinding("a", "pairs", "top: mirrored", RIGHT, 0.1, 1e-9),
     "undecided pair": PairFinding("a", "pairs", "top, heavy: mirrored", UNDECIDED, 0.1, 1e-9),
+    "parity": Finding("a and b", "parity", "brick_flip", WRONG, 0.12, 1e-4),
     "repeatability": Finding("a", "repeatability", "golden_0", WRONG, by="bits", detail="a second run has other samples"),
     "right repeatability": Finding("a", "repeatability", "golden_0", RIGHT, by="bits"),
     "protocol": Finding("a", "protocol", "hello", RIGHT, detail="C, version 1"),

@@ -53,7 +53,7 @@ def test_the_wrong_one_of_two_is_named_with_its_mistake():
         assert findings(found)[:2] == sorted([(names[0], "right"), (names[1], "wrong")])
         assert found.findings[0 if order < 0 else 1].mistake == "no gyroscopic term"
         assert found.findings[2].error > 0.1
-        assert found.reason.startswith(f"{names[0]} is right")
+        assert found.reason.startswith(f"{names[1]} is wrong")
 
 
 def test_two_right_ones_agree_whatever_their_columns_times_and_starts():
