@@ -10,9 +10,10 @@ import numpy as np
 from ..compare import LONGEST
 from ..explain import FEWEST
 from ..finding import Finding, Verdict, Verification, uncapitalised
+from ..which import Difference
 from .comparison import prepare
 from .free_body import FreeBody, Freedom, fit_free_body
-from .two import Difference, Named, Two, find_difference, join, name_apart, verify_both
+from .two import Named, Two, find_difference, join, name_apart, verify_both
 
 ASSUMED = "Without --body, the body is assumed to rotate freely: no field, torque or damping acts on it"
 NEGLIGIBLE = 0.1
