@@ -70,7 +70,7 @@ class Method(ABC):
     3. `supports` has the features of scenes that it supports, and `unsupported` returns a reason that depends on numbers: no
        other scene reaches `prepare` and `prepare_many`.
     4. `prepare(scene, grid)` does all work that is needed once, compiles, raises `BadInput` for a step that is too long, and
-       returns a function without arguments, the run, which is what studies time.
+       returns a function, the run, which is what studies time, without arguments.
     5. A run starts from the initial state in each call and depends on nothing but scene, grid and settings; runs of separate
        calls of `prepare` can execute in parallel threads, the same run cannot.
     6. A run returns a `Trajectory` of the scene with all samples of the grid, the first of which is the initial state, in body
@@ -189,10 +189,10 @@ class Method(ABC):
 
         For loops over initial states, every run can also be called as `run(R_WB0, w_WB_B0)`, with another attitude (3, 3) or
         SciPy `Rotation`, and other rates (3,), rad/s, body axes; everything else of the scene stays. The trajectory is that of
-        `prepare` for the scene with this start, to round-off. Its arrays, and its scene, are overwritten by the next such call
-        of the same run: copy what has to stay. `run()` starts from the scene's initial state as before. With `Taylor` in SI
-        units, a start takes 2 us beside its steps; all other methods prepare the run again. `BadInput` is raised for a start
-        that `Scene` does not accept.
+        `prepare` for the scene with this start, to round-off. The next such call of the same run may overwrite its arrays and
+        its scene: copy what has to stay. `run()` starts from the scene's initial state as before. With `Taylor`, such a call
+        takes 3 us beside the compiled code. All other methods prepare the run again, and so does `Taylor` in other units than
+        SI. `BadInput` is raised for a start that `Scene` does not accept.
         """
 
     def prepare_many(self, bodies: Any, grid: Grid) -> Any:

@@ -29,6 +29,7 @@ from ..potentials.load import load_field
 from ..potentials.potential import depends_on_time
 from ..scene import Scene
 from ..trajectory import Counters, StepControl, Trajectory
+from .pieces import no_output
 from .principal_axes import PrincipalStart
 from .units import bound_rate
 
@@ -105,7 +106,7 @@ def walk(  # noqa: PLR0915  # one loop
     smooth = scene.smoothness(end)
     longest = min(LONGEST / rate * min(1.0, (tolerance / LOOSE) ** (POWER / 2)), smooth.step, end)
     edges = [-math.inf, *smooth.breaks.tolist(), math.inf]
-    q, L, room = model.q, model.L, (np.empty((2, 4)), np.zeros((2, columns)))
+    q, L, room = model.q, model.L, (np.empty((2, 4)), np.zeros((2, columns)), *no_output())
     path.q[0], path.L[0, :3], supplied = q, L, np.zeros(columns - 3)
 
     def take(now: float, h: float, n: int, window: tuple[float, float]) -> tuple[Any, Any, Any] | None:

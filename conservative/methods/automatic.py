@@ -83,6 +83,8 @@ def choose(trials: Trials, error: float, t_end: float, samples: SampleTimes) -> 
     """
     key, choices = (error, t_end, samples.spacing, samples.every, samples.at is None), trials.known.choices
     if key in choices:
+        grid = best_of(choices[key]).grid
+        require_memory("sample_every", grid.n_steps, grid.every)
         return choices[key], None
     method, dt = find_cheapest(trials, error, t_end)
     dt = dt if samples.at is None else divide_step(trials.scene, method, dt)

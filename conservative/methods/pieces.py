@@ -118,6 +118,11 @@ def march_pieces(
     return (*result, kernels("samples").fill(grid.t[:n], 1, n, q, L, axes, R_WB[:n], w_WB_B[:n]))
 
 
+def no_output() -> tuple[Array, Array, Array]:
+    """Return the `Output` of a kernel whose samples are not converted."""
+    return np.zeros(kernels("samples").END), np.empty((0, 3, 3)), np.empty((0, 3))
+
+
 def _march(
     pieces: Sequence[Piece],
     kernel: Any,
@@ -129,7 +134,7 @@ def _march(
     L: Array,
 ) -> tuple[int, int, int, int | None, float, bool]:
     """Take the steps of all pieces, and fill the samples q and L."""
-    nothing = np.zeros(kernels("samples").END), np.empty((0, 3, 3)), np.empty((0, 3))
+    nothing = no_output()
     state, supplied, ends = (model.q, model.L), np.zeros(4), (np.empty((2, 4)), np.empty((2, 7)))
     stages, corrections, evaluations, size = 0, 0, None, 0.0
     q[0], L[0, :3], L[0, 3:] = model.q, model.L, 0.0

@@ -41,10 +41,13 @@ SCENES = {
     "top": cv.scenes.lagrange_top(),
     **{field: random_body(field, 5, 0) for field in ("gravity", "spring", "attraction", "fixed_gradient", "gradient")},
 }
-METHODS = tuple(
-    method
-    for family in registry.list_families().values()
-    for method in dict.fromkeys((*family.settings_in_tables(), *family.settings_for("report")))
+METHODS = (
+    *(
+        method
+        for family in registry.list_families().values()
+        for method in dict.fromkeys((*family.settings_in_tables(), *family.settings_for("report")))
+    ),
+    cv.Projected(tolerance=1e-9),
 )
 CASES = [(scene, method.name) for (scene, held), method in product(SCENES.items(), METHODS) if method.unsupported(held) is None]
 
