@@ -25,10 +25,11 @@ Warp, graphs: https://nvidia.github.io/warp/
 """
 
 from functools import partial
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from .shared import FAR_MASS, FAR_PLACE, description_of, halves, record_warp, write_urdf
+from .shared import FAR_MASS, FAR_PLACE, OTHER_MASS, OTHER_SIZE, description_of, halves, record_warp, rescaled, write_urdf
 
 ORDERS = {
     **{"SemiImplicit": 1, "XPBD": 1, "Featherstone": 1, "VBD": 1, "Kamino": 1},
@@ -43,7 +44,7 @@ ENGINE = {
     "settings": {"solver": "MuJoCo_rk4", "as_installed": False},
     "orders": ORDERS,
     "precision": "f32",
-    "descriptions": ("frame", "file", "setter", "child", "world"),
+    "descriptions": ("frame", "file", "setter", "child", "world", "rewritten", "mass", "scaled"),
     "fields": ("UniformGravity",),
     "free_only": {
         "SemiImplicit": "the joints of SolverSemiImplicit are springs, too stiff for such steps",
@@ -56,6 +57,13 @@ ENGINE = {
 }
 
 DAMPED = ("SemiImplicit", "Featherstone")
+OF_FILES = {
+    "file": {},
+    "rewritten": {},
+    "mass": {"mass": OTHER_MASS},
+    "scaled": {"length": 1 / OTHER_SIZE, "inertia": OTHER_SIZE**-2},
+}
+"""Descriptions of a body by a file, and the factors of what the file has."""
 DUMMY = (0.1, 0.2, 0.3), np.array([[2.0, 0.1, 0.2], [0.1, 3.0, 0.3], [0.2, 0.3, 4.0]])
 """Centre of mass, m, and inertia, kg m^2, of a body before its setters."""
 WITH_MEMORY = ("VBD", "Kamino")
@@ -73,7 +81,7 @@ def prepare(given):
     warp.set_device("cpu")
     model = _model(newton, warp, given)
     solver = _solver(newton, model, given)
-    if description_of(given) == "setter":
+    if description_of(given) in ("setter", "mass"):
         _set_body(newton, model, solver, given)
     contacts = newton.CollisionPipeline(model).contacts() if given.solver == "VBD" else None  # VBD does not step without
     states, start, control = (model.state(), model.state()), model.state(), model.control()
@@ -114,7 +122,7 @@ def _model(newton, warp, given):
     builder.gravity = -given.gravity if isinstance(builder.gravity, float) else (0.0, 0.0, -given.gravity)  # until 1.0
     if given.solver == "Kamino":
         newton.solvers.SolverKamino.register_custom_attributes(builder)
-    body = _add_body(builder, warp, given)
+    body = _add_body(newton, builder, warp, given)
     lever = given.R0 @ given.com
     if description_of(given) == "world":
         far = warp.transform(FAR_PLACE, (0.0, 0.0, 0.0, 1.0))
@@ -125,7 +133,7 @@ def _model(newton, warp, given):
     return builder.finalize(device="cpu")
 
 
-def _add_body(builder, warp, given):
+def _add_body(newton, builder, warp, given):
     """Add the body, on a free joint, or on a ball joint without armature, friction and damping; return its number."""
     w, x, y, z = given.q0.tolist()
     options = {
@@ -136,13 +144,18 @@ def _add_body(builder, warp, given):
     }
     if description_of(given) == "setter":
         options |= {"com": warp.vec3(*DUMMY[0]), "inertia": warp.mat33(*DUMMY[1].ravel().tolist()), "mass": 1.0}
-    if given.free and description_of(given) == "file":
-        builder.add_urdf(write_urdf(given), floating=True)
+    of_file = description_of(given) in OF_FILES
+    if of_file and given.free:
+        _add_file(newton, builder, given)
         builder.body_q[0] = options["xform"]
         return 0
     if given.free and description_of(given) != "child":
         return builder.add_body(**options)
     parts = [{**options, "mass": mass, "inertia": warp.mat33(*inertia.ravel().tolist())} for mass, inertia in halves(given)]
+    if of_file:  # its numbers, because a URDF file has no ball joint
+        loaded = newton.ModelBuilder()
+        _add_file(newton, loaded, given)
+        parts = [{**options, **{name: getattr(loaded, f"body_{name}")[0] for name in ("mass", "com", "inertia")}}]
     body = builder.add_link(**parts[0])
     still = {"armature": 0.0, "friction": 0.0, "damping": 0.0}
     joints = [builder.add_joint_free(body) if given.free else builder.add_joint_ball(-1, body, **still)]
@@ -151,14 +164,30 @@ def _add_body(builder, warp, given):
     return body
 
 
+def _add_file(newton, builder, given):
+    """Add the body of a URDF file, or of the MJCF file as which Newton saves it."""
+    description = description_of(given)
+    text = write_urdf(rescaled(given, **OF_FILES[description]))
+    if description != "rewritten":
+        builder.add_urdf(text, floating=True, scale=OTHER_SIZE if description == "scaled" else 1.0)
+        return
+    loaded = newton.ModelBuilder()
+    loaded.add_urdf(text, floating=True)
+    with TemporaryDirectory() as folder:
+        saved = {"save_to_mjcf": f"{folder}/saved.xml", "use_mujoco_cpu": True, "disable_contacts": True}
+        newton.solvers.SolverMuJoCo(loaded.finalize(device="cpu"), **saved)
+        builder.add_mjcf(saved["save_to_mjcf"])
+
+
 def _set_body(newton, model, solver, given):
-    """Set mass, centre of mass and inertia of the model, and tell the solver, which has computed with others.
+    """Set mass, centre of mass and inertia of the model, or its mass, and tell the solver, which has computed with others.
 
     Solvers of Newton read the inverses, too, which no setter computes.
     """
-    inverse = np.linalg.inv(given.inertia_com)
-    values = {"mass": given.mass, "com": given.com, "inertia": given.inertia_com}
-    for name, value in {**values, "inv_mass": 1 / given.mass, "inv_inertia": inverse}.items():
+    values = {"mass": given.mass, "inv_mass": 1 / given.mass}
+    if description_of(given) == "setter":
+        values |= {"com": given.com, "inertia": given.inertia_com, "inv_inertia": np.linalg.inv(given.inertia_com)}
+    for name, value in values.items():
         getattr(model, f"body_{name}").assign(np.array([value], np.float32))
     solver.notify_model_changed(newton.ModelFlags.BODY_INERTIAL_PROPERTIES)
 

@@ -562,6 +562,7 @@ FOUND = {
         "",
     ),
     "drake": ("mass set after loading", set(), ""),
+    "newton:MuJoCo_cpu_rk4": ("scaled", set(), ""),
     "drake:accuracy=1e-12": ("run again", set(), ""),
 }
 """Pairs that differ in engines. DART and Drake are right: their adapters once began with other rates, and another step."""
