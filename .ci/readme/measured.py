@@ -88,6 +88,7 @@ def render_page(page: str = "README.md") -> str:
     return environment.from_string((HERE / PAGES[page]).read_text(encoding="utf-8")).render(
         results=scene_table(values, versions),
         same=same_tolerance(values),
+        lame=slower_on_tops(values),
         measured=lambda *key: key in values,
         value=lambda *key: values[key],
         interval=lambda *place: interval(values, *place),
@@ -151,6 +152,15 @@ def same_tolerance(values: Values) -> SameTolerance:
     names = [FIELDS[field] for field in won]
     won_in = " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
     return SameTolerance(called, bodies, won_in, [min(every), max(every)], min(min(worst[field]) for field in won), lost)
+
+
+def slower_on_tops(values: Values) -> list[tuple[str, list[float]]]:
+    """Return the tops on which heyoka is faster than our closed form, with the ratio and the ends of its interval."""
+    found = []
+    for scene, name in (("lagrange_top", "steady"), ("nutating_top", "nutating")):
+        if (scene, "closed form", RATIO) in values and (ratio := interval(values, scene, "closed form"))[2] < 1:
+            found.append((name, ratio))
+    return found
 
 
 def scene_table(values: Values, versions: dict[str, str]) -> str:

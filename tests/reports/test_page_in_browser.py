@@ -105,7 +105,7 @@ def requests(browser):
     """Return every address that the page asked for; the browser's own pages are not the page's."""
     events = (json.loads(entry["message"])["message"] for entry in browser.get_log("performance"))
     asked = [event["params"]["request"]["url"] for event in events if event["method"] == "Network.requestWillBeSent"]
-    return [url for url in asked if not url.startswith(("chrome:", "about:", "data:", "blob:"))]
+    return [url for url in asked if not url.startswith(("chrome:", "chrome-untrusted:", "about:", "data:", "blob:"))]
 
 
 def test_nothing_is_asked_for_but_the_file_and_nothing_goes_wrong(opened, folder):
@@ -115,9 +115,9 @@ def test_nothing_is_asked_for_but_the_file_and_nothing_goes_wrong(opened, folder
 
 def test_the_first_look_is_short(opened, folder):
     words = opened.execute_script("return document.body.innerText")
-    assert 50 < len(words.split()) <= 300  # MEASURE
+    assert 50 < len(words.split()) <= 350  # measured 312
     end = opened.execute_script("return document.querySelector('main > details').getBoundingClientRect().bottom")
-    assert end + opened.execute_script("return scrollY") < 1000  # MEASURE
+    assert end + opened.execute_script("return scrollY") < 1000  # px, 1,280 wide; measured 923
     entries = opened.execute_script(
         "return [...document.querySelectorAll('.legend')].map(l => [...l.querySelectorAll('.entry')]"
         ".filter(e => e.checkVisibility()).length).filter(n => n)"
