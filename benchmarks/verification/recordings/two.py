@@ -76,10 +76,11 @@ def verify_both(
     errors: tuple[float | None, float | None],
     tell: Callable[[str], object] = lambda _: None,
     decides: str = ". --start scene decides",
+    by: str = "error",
 ) -> Verification:
     """Verify two recordings with different names, as `verify_two`, each with an allowed error of its own.
 
-    `decides` ends the reason if both are right, and differ.
+    `decides` ends the reason if both are right, and differ. `by` says what the allowed errors come from.
     """
     first, second = pair
     rows, made = dict[str, Rows](), dict[str, Verification]()
@@ -89,8 +90,8 @@ def verify_both(
         started = _start(scene, recording, [*zip(rows.values(), made.values(), strict=True)]) if from_row else scene
         error = allowed[name]
         try:
-            rows[name] = prepare(started.rotation_only, recording, from_row, error)
-            made[name] = verify_recording(started, recording, from_row, error, _labelled(tell, name), name)
+            rows[name] = prepare(started.rotation_only, recording, from_row, error, by)
+            made[name] = verify_recording(started, recording, from_row, error, _labelled(tell, name), name, by)
         except BadInput as refused:
             if refused.argument != "run" or name in str(refused.got):
                 raise  # an option is wrong, or the message names the file already

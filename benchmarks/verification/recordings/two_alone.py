@@ -18,6 +18,8 @@ from .two import Named, Two, find_difference, join, name_apart, verify_both
 ASSUMED = "Without --body, the body is assumed to rotate freely: no field, torque or damping acts on it"
 NEGLIGIBLE = 0.1
 """Errors by the interval of a fitted body, over the allowed errors, that widen no limit."""
+INTERVAL = "digits and the interval of the fitted body"
+"""What allows the error of a recording beside the motion of a body that was fitted to another one."""
 Pair = tuple[Named, Named]
 
 
@@ -55,7 +57,7 @@ def verify_two_alone(
     for i in sorted((0, 1), key=lambda i: (not fits[i].determined, float(fits[i].sizes.max()))):
         if fits[i].freedom is Freedom.FREE:
             errors = [_widen(fits[i], recording, error) if i != j else error for j, (_, recording) in enumerate(pair)]
-            made[i] = verify_both(fits[i].scene, pair, True, (errors[0], errors[1]), tell, decides="")
+            made[i] = verify_both(fits[i].scene, pair, True, (errors[0], errors[1]), tell, "", "error" if error else INTERVAL)
             if all(verification.verdict is Verdict.RIGHT for verification in _parts(made[i])):
                 return _assuming(replace(made[i], reason=f"{made[i].reason}; {_body(fits[i])}"))
     decisive = [i for i in made if fits[i].determined]

@@ -91,6 +91,7 @@ def _plant(number: int, draw: Draw) -> Pair:
             t = times_of_right(draw, t, gap)
         recording = Planted(number, kind, name, world, LAYOUT, noise)
         recording.scene = world.toml(float(t[-1]) * 1.5 + gap)
+        recording.about |= {"turns": gap * len(t) * rate / (2 * math.pi)}
         recording.about |= {"gap": gap, "parts": int(draw.random.integers(1, 4)), "rate": rate, "parts of the scene": "free"}
         Y = simulate(draw, recording, t, gap, recording.about["parts"], rate)
         write(draw, recording, t[: len(Y)], Y)
