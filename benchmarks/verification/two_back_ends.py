@@ -191,7 +191,7 @@ def parity(
         An engine is not installed.
     """
     if same(a, b):
-        raise BadInput("b", f"the back end a a second time ({describe(b)})", "another back end, version or setting")
+        raise BadInput("b", f"the first back end again ({describe(b)})", "another back end, version or setting")
     checks = [only] if isinstance(only, str) else list(only)
     for name in checks:
         if name not in CHECKS:
@@ -232,7 +232,7 @@ def _find_both(a: AnyBackEnd, b: AnyBackEnd) -> list[Runnable | tuple[str, Unusa
     if first != second:
         return found
     if all(isinstance(side, Runnable) and side.kind != "function" for side in found):
-        raise BadInput("b", f"{second!r}, the back end a a second time", "another back end, version or setting")
+        raise BadInput("b", f"the first back end again ({second!r})", "another back end, version or setting")
     return [
         replace(side, name=f"{side.name} ({letter})") if isinstance(side, Runnable) else (f"{side[0]} ({letter})", side[1])
         for side, letter in zip(found, "ab", strict=True)
@@ -327,13 +327,11 @@ def _measure(side: Runnable, motions: Sequence[Motion], tell: Callable[[str], ob
     except Raised as raised:
         allowed = "a function that returns the motion of every free body, or raises NotImplementedError"
         raise BadInput(side.name, f"{raised} in the motion {able[0].name}", allowed) from raised.error
-    if not side.measured:
-        return side, []
     notes = list[str]()
-    if isinstance(answer, Samples) and is_single(answer) and not side.single:
+    if side.measures_precision and isinstance(answer, Samples) and is_single(answer):
         side = replace(side, single=True)
         notes.append("its numbers have single precision")
-    if side.order is None:
+    if side.measures_order:
         tell(f"{side.name}: order")
         free = [motion for motion in able if is_generic(motion)] or able
         longest = sorted(free, key=lambda motion: -motion.steps * motion.samples)[:GENERIC]
@@ -403,7 +401,7 @@ def _difference(motion: Motion, first: Ran, second: Ran) -> tuple[Difference, Cu
 
 def _order_finding(found: Runnable, convergence: Convergence, unit: str) -> Finding:
     """Return the finding on the convergence of a back end in the sweep."""
-    order, declared = convergence.order, None if found.measured else found.order
+    order, declared = convergence.order, None if found.measures_order else found.order
     slow = declared is not None and not found.single and order.slope < declared - SLOPE  # False for nan
     elsewhere = convergence.limit in (Limit.OTHER, Limit.NOTHING)
     verdict = Verdict.WRONG if elsewhere or slow else Verdict.RIGHT
