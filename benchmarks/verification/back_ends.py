@@ -22,6 +22,7 @@ from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.environments.adapter import AdapterMethod
 from conservative.references.environments.programs import find_program, program_class, read_program
 from conservative.scene import Scene
+from conservative.trajectory import Trajectory
 
 from ..studies.selection import bits_of, tolerance_setting
 from .programs import PATIENCE, Samples, Solve, solver
@@ -296,7 +297,7 @@ def _expected(part: Array, shape: tuple[int, ...], what: str) -> str:
     return f"{what} of shape {shape}; a function returns {RETURNS}"
 
 
-def is_single(samples: Samples) -> bool:
+def is_single(samples: Samples | Trajectory) -> bool:
     """Return whether all numbers of the attitudes, or of the rates, are numbers of single precision."""
     for x in (samples.R_WB, samples.w_WB_B):
         if x is not None and len(x) > 1 and np.isfinite(x).all() and np.array_equal(x[1:], x[1:].astype(np.float32)):

@@ -335,6 +335,19 @@ def test_a_body_that_a_function_does_not_support_is_not_tested():
     assert verdicts(found) == ("right", "right")
     assert [row.second.verdict for row in found.details.table] == ["right", "not tested"]
     assert "principal axes only" in found.details.table[1].second.detail
+    first = parity(midpoint, principal, motions=["products", "brick_flip"])
+    assert [row.second.verdict for row in first.details.table] == ["not tested", "right"]
+    none = parity(midpoint, principal, motions=["products"])
+    assert verdicts(none) == ("right", "not tested")
+    assert "not compared with each other" in none.reason or "is not tested" in none.reason
+
+
+def test_a_program_that_does_not_run_is_wrong(tmp_path):
+    file = tmp_path / "silent.py"
+    file.write_text("")
+    found = parity(shlex.join([sys.executable, str(file)]), midpoint, motions=SMALL)
+    assert verdicts(found) == ("wrong", "right")
+    assert "silent.py is wrong: " in found.reason
 
 
 def test_fresh_motions_and_engines():
@@ -342,6 +355,14 @@ def test_fresh_motions_and_engines():
     found = parity("mujoco:RK4", "pinocchio", seed=7, only=["motions", "parity"])
     assert found.verdict == "right"
     assert found.details.difference.error[0] < 1e-9
+
+
+def test_engines_get_principal_axes_and_are_compared_in_body_axes():
+    """Bodies with products of inertia; measured 3e-7 rad apart, and 2 rad in different axes."""
+    found = parity(midpoint, "mujoco:RK4", motions=["products", "world_tensor"])
+    assert verdicts(found) == ("right", "right")
+    assert found.details.difference.error[0] < 1e-5
+    assert found.details.sweep.steps.between[-1] < 1e-5
 
 
 def program(name):
@@ -464,12 +485,12 @@ def test_two_versions_are_judged_as_the_page_says(monkeypatch):
 
 
 def test_a_back_end_is_ten_lines():
-    """The most is 9 lines of code: what a user writes for an engine."""
-    for file, functions in {"environment": ("environment", "wrapper", "run"), "unisim": ("first", "second", "run")}.items():
+    """Most is 10 lines, docstring included. Basilisk's simulation around hub and scene takes more, once for both."""
+    of = {"environment": ("environment", "wrapper", "run"), "unisim": ("first", "second", "run"), "basilisk": ("hub", "scene")}
+    for file, functions in of.items():
         tree = ast.parse((EXAMPLES / f"{file}.py").read_text(encoding="utf-8"))
-        of = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef)}
-        for name in functions:
-            assert of[name].end_lineno - of[name].lineno + 1 <= 12
+        nodes = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef)}
+        assert all(nodes[name].end_lineno - nodes[name].lineno + 1 <= 10 for name in functions)
 
 
 def test_the_sweep_of_the_page_is_measured():
