@@ -6,7 +6,6 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -23,6 +22,7 @@ from conservative.outcome import Outcome, OutcomeKind
 from conservative.references.environments.adapter import AdapterMethod
 from conservative.references.environments.programs import find_program, program_class, read_program
 from conservative.scene import Scene
+from conservative.trajectory import Trajectory
 
 from ..studies.selection import bits_of, tolerance_setting
 from .programs import PATIENCE, Samples, Solve, solver
@@ -114,7 +114,7 @@ class Runnable:
     solve
         Integrates a scene on a grid.
     order
-        The declared order; None if it is adaptive, or not known yet (`measured`).
+        Its order; None if it is adaptive, or not known yet.
     single
         Whether its numbers have single precision.
     principal
@@ -123,8 +123,8 @@ class Runnable:
         Returns why it does not support a scene, None if it may.
     settings
         Settings for the sweep, in addition to the step.
-    measured
-        Whether its order and precision have to be measured.
+    measures_order, measures_precision
+        Whether its order and its precision are not declared, and have to be measured.
     """
 
     name: str
@@ -135,7 +135,8 @@ class Runnable:
     principal: bool
     unsupported: Callable[[Scene], str | None]
     settings: tuple[Setting, ...] = ()
-    measured: bool = False
+    measures_order: bool = False
+    measures_precision: bool = False
 
 
 AnyBackEnd = BackEnd | Callable[..., Any] | Method | str | os.PathLike[str]
@@ -169,8 +170,7 @@ def _named(text: str) -> Runnable:
         advice = "without --pairs, two recordings are compared with each other" if kind is Kind.RECORDING else "without --pairs"
         raise BadInput("subject", f"{text!r}, a {kind}", f"an engine, a method or a program; {advice}")
     if kind is Kind.PROGRAM and find_program(text.partition(":")[0]) is None:  # the command line of a program
-        program = read_program(str(Path(text)) if Path(text).is_file() else text, "program")
-        return replace(of_method(program_class(program, PATIENCE)(), kind), name=text)
+        return replace(of_method(program_class(read_program(text, "program"), PATIENCE)(), kind), name=text)
     return of_method(registry.method(text), kind)
 
 
@@ -218,7 +218,8 @@ def _of_function(own: BackEnd, letter: str) -> Runnable:
         False,
         _unsupported,
         tuple(solvers),
-        measured=own.order is None or own.precision is None,
+        measures_order=own.order is None,
+        measures_precision=own.precision is None,
     )
 
 
@@ -296,7 +297,7 @@ def _expected(part: Array, shape: tuple[int, ...], what: str) -> str:
     return f"{what} of shape {shape}; a function returns {RETURNS}"
 
 
-def is_single(samples: Samples) -> bool:
+def is_single(samples: Samples | Trajectory) -> bool:
     """Return whether all numbers of the attitudes, or of the rates, are numbers of single precision."""
     for x in (samples.R_WB, samples.w_WB_B):
         if x is not None and len(x) > 1 and np.isfinite(x).all() and np.array_equal(x[1:], x[1:].astype(np.float32)):

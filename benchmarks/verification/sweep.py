@@ -253,7 +253,7 @@ def _convergence(
     above = [size if size > ROUND_OFF else math.nan for size in errors]  # round-off would make the line bend
     order = observed_order(steps, above if sum(map(math.isfinite, above)) >= MIN_POINTS else errors)
     own = own_order(steps, made, RESOLVED["f32" if side.single else "f64"])
-    chooses = side.order is None and not side.measured  # its steps, by a tolerance that limits its error
+    chooses = side.order is None and not side.measures_order  # its steps, by a tolerance that limits its error
     if math.isnan(last):
         limit = Limit.UNKNOWN
     elif last <= (AT_TOLERANCE if chooses else AT_ROUNDING * (10 if side.single else 1)):

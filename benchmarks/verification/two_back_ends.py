@@ -18,11 +18,12 @@ import numpy as np
 from conservative import registry
 from conservative.attitude import angle_between
 from conservative.check import describe
-from conservative.errors import BadInput
+from conservative.errors import BadInput, Unsupported
 from conservative.grid import Grid
 from conservative.references.environments.programs import UnusableProgram
 from conservative.references.worker.client import time_limit
 from conservative.scene import Scene
+from conservative.trajectory import Trajectory
 
 from . import known as known_errors
 from . import protocol
@@ -191,7 +192,7 @@ def parity(
         An engine is not installed.
     """
     if same(a, b):
-        raise BadInput("b", f"the back end a a second time ({describe(b)})", "another back end, version or setting")
+        raise BadInput("b", f"the first back end again ({describe(b)})", "another back end, version or setting")
     checks = [only] if isinstance(only, str) else list(only)
     for name in checks:
         if name not in CHECKS:
@@ -208,10 +209,12 @@ def parity(
 
 
 def _choose_motions(names: Sequence[str] | None, seed: int | None) -> list[Motion]:
+    listed = [names] if isinstance(names, str) else names
+    if listed is not None and not len(listed):
+        return []
     every = list(motions_of(seed))
-    if names is None:
+    if listed is None:
         return every
-    listed = [names] if isinstance(names, str) else list(names)
     by_name = {motion.name: motion for motion in every}
     for name in listed:
         if name not in by_name:
@@ -232,7 +235,7 @@ def _find_both(a: AnyBackEnd, b: AnyBackEnd) -> list[Runnable | tuple[str, Unusa
     if first != second:
         return found
     if all(isinstance(side, Runnable) and side.kind != "function" for side in found):
-        raise BadInput("b", f"{second!r}, the back end a a second time", "another back end, version or setting")
+        raise BadInput("b", f"the first back end again ({second!r})", "another back end, version or setting")
     return [
         replace(side, name=f"{side.name} ({letter})") if isinstance(side, Runnable) else (f"{side[0]} ({letter})", side[1])
         for side, letter in zip(found, "ab", strict=True)
@@ -318,22 +321,21 @@ def _judge(side: Runnable | tuple[str, UnusableProgram], motions: Sequence[Motio
 
 def _measure(side: Runnable, motions: Sequence[Motion], tell: Callable[[str], object]) -> tuple[Runnable, list[str]]:
     """Return a function with its precision and order, which are measured if they are not declared, and notes on them."""
-    able = [motion for motion in motions if side.unsupported(motion.scene) is None]
-    if not able:
-        return side, []
-    tell(f"{side.name}: {able[0].name}")
-    try:
-        answer = side.solve(able[0].scene, Grid(able[0].step / 10, 10, 1))
-    except Raised as raised:
-        allowed = "a function that returns the motion of every free body, or raises NotImplementedError"
-        raise BadInput(side.name, f"{raised} in the motion {able[0].name}", allowed) from raised.error
-    if not side.measured:
+    able, answer = list[Motion](), None
+    for motion in motions:
+        if side.unsupported(motion.scene) is not None:
+            continue
+        able.append(motion)
+        if answer is None:
+            tell(f"{side.name}: {motion.name}")
+            answer = _first_answer(side, motion)
+    if answer is None:
         return side, []
     notes = list[str]()
-    if isinstance(answer, Samples) and is_single(answer) and not side.single:
+    if side.measures_precision and is_single(answer):
         side = replace(side, single=True)
         notes.append("its numbers have single precision")
-    if side.order is None:
+    if side.measures_order:
         tell(f"{side.name}: order")
         free = [motion for motion in able if is_generic(motion)] or able
         longest = sorted(free, key=lambda motion: -motion.steps * motion.samples)[:GENERIC]
@@ -341,6 +343,17 @@ def _measure(side: Runnable, motions: Sequence[Motion], tell: Callable[[str], ob
         measured = "its motions do not depend on the step" if side.order is None else f"its order is {side.order}"
         notes.append(f"{measured}, measured without the exact motion")
     return side, notes
+
+
+def _first_answer(side: Runnable, motion: Motion) -> Samples | Trajectory | None:
+    """Return the answer of a function for the beginning of a motion, None if it does not support the body."""
+    try:
+        return side.solve(motion.scene, Grid(motion.step / 10, 10, 1))
+    except Unsupported:
+        return None
+    except Raised as raised:
+        allowed = "a function that returns the motion of every free body, or raises NotImplementedError"
+        raise BadInput(side.name, f"{raised} in the motion {motion.name}", allowed) from raised.error
 
 
 def _compare(judged: Sequence[Judged], motions: Sequence[Motion], subject: str) -> tuple[list[Row], Difference, Curves | None]:
@@ -403,7 +416,7 @@ def _difference(motion: Motion, first: Ran, second: Ran) -> tuple[Difference, Cu
 
 def _order_finding(found: Runnable, convergence: Convergence, unit: str) -> Finding:
     """Return the finding on the convergence of a back end in the sweep."""
-    order, declared = convergence.order, None if found.measured else found.order
+    order, declared = convergence.order, None if found.measures_order else found.order
     slow = declared is not None and not found.single and order.slope < declared - SLOPE  # False for nan
     elsewhere = convergence.limit in (Limit.OTHER, Limit.NOTHING)
     verdict = Verdict.WRONG if elsewhere or slow else Verdict.RIGHT

@@ -213,6 +213,7 @@ def verify(
     kinds, alone = set(kinds_in_order), kinds_in_order == [Kind.RECORDING]
     together = TWO in values["pairs"]
     given = {"picture": picture, "scripts": scripts, **values}
+    require_descriptions(values["pairs"])
     options = used_by_two(given, names) if together else used(given, kinds)
     if not subjects:  # the masses of the small files are no robot's
         options.setdefault("only", ["bodies"])
@@ -275,6 +276,17 @@ def verify_two(first: str, second: str, **options: Any) -> Verification:
     from conservative.benchmarks.verification import parity  # here: recordings need no kernels
 
     return parity(first, second, **options)
+
+
+def require_descriptions(texts: Sequence[str]) -> None:
+    """Raise `BadInput` for a subject that follows --pairs, which would be the name of a pair of descriptions."""
+    from conservative import registry
+
+    subjects = {*registry.list_engines(), *registry.list_methods()}
+    for text in texts:
+        if text.partition(":")[0].partition("@")[0] in subjects:
+            allowed = f"names of pairs of descriptions; two subjects go before it: conservative verify {text} OTHER --pairs"
+            raise BadInput("pairs", f"the subject {text!r}", allowed)
 
 
 def used_by_two(values: Mapping[str, Any], names: Sequence[str]) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from conservative.benchmarks.verification.motions.motion import load
 from conservative.benchmarks.verification.motions.own import motion_of
 from conservative.benchmarks.verification.sweep import Limit, Series, measured_order, sentences
 from conservative.errors import BadInput, MissingEngine
-from conservative.number_text import number
+from conservative.number_text import number, rounded_up
 from conservative.references.worker.client import close_workers
 from conservative.reports.cli.main import main
 
@@ -91,11 +91,10 @@ KEPT = ("one: damping 0.02", "one: inertia in world axes", "same: no gyroscopic 
 
 
 @pytest.mark.parametrize("name", sampled(PAIRS, 6, keep=KEPT))
-def test_planted_pairs(name, request):
+def test_planted_pairs(name):
     """Of 60 pairs, 40 with one wrong, 10 with both wrong and 10 with both right, none is judged wrongly."""
     a, b, *planted = PAIRS[name]
-    motions = None if request.node.get_closest_marker("slow") else FEW
-    found = parity(planted_pairs.back_end(a, "a"), planted_pairs.back_end(copy.copy(b), "b"), motions=motions)
+    found = parity(planted_pairs.back_end(a, "a"), planted_pairs.back_end(copy.copy(b), "b"))
     assert verdicts(found) == tuple("wrong" if key else "right" for key in planted), found.sentence
     for key, side in zip(planted, (found.details.first, found.details.second), strict=True):
         assert not key or key in keys(side) or key == "explicit Euler", found.sentence  # an order has no mistake
@@ -257,7 +256,7 @@ BAD = {
     "world rates alone": (BackEnd(of(lambda R, w: w), "b", rates="world"), "rates in world axes without attitudes"),
     "a number": (3, "b: got 3; expected a function simulate(R0, w0, inertia, dt, n)"),
     "a class": (Series, "expected a function simulate(R0, w0, inertia, dt, n)"),
-    "the same": (midpoint, "got the back end a a second time"),
+    "the same": (midpoint, "got the first back end again"),
     "a file": (__file__, "expected an engine, a method or a program"),
     "a name": ("no such engine", "expected a file that exists, the name of an engine"),
 }
@@ -280,7 +279,7 @@ def test_bad_back_ends_are_refused_by_name(name):
         ({"seed": -1}, "seed: got -1"),
         ({"seed": 1, "known": "known.txt"}, "seed: got 1 and known errors"),
         ({"body": "no_such_scene"}, "no_such_scene"),
-        ({"body": "dumbbell_satellite"}, "expected a free body, a rotor, uniform gravity"),
+        ({"body": "stable_satellite"}, "expected a free body, a rotor, uniform gravity"),
     ],
 )
 def test_bad_options_are_refused_by_name(options, message):
@@ -309,9 +308,9 @@ def test_bad_options_of_a_back_end_are_refused_by_name(options, argument):
 
 
 def test_one_name_twice_and_a_missing_engine_are_refused():
-    with pytest.raises(BadInput, match="a second time"):
+    with pytest.raises(BadInput, match="the first back end again"):
         parity("no_squish", "no_squish")
-    with pytest.raises(BadInput, match="a second time"):
+    with pytest.raises(BadInput, match="the first back end again"):
         parity("mujoco", "mujoco:RK4")  # its default setting
     with pytest.raises(MissingEngine):
         parity("no_squish", "exudyn@1.0.0")
@@ -336,6 +335,19 @@ def test_a_body_that_a_function_does_not_support_is_not_tested():
     assert verdicts(found) == ("right", "right")
     assert [row.second.verdict for row in found.details.table] == ["right", "not tested"]
     assert "principal axes only" in found.details.table[1].second.detail
+    first = parity(midpoint, principal, motions=["products", "brick_flip"])
+    assert [row.second.verdict for row in first.details.table] == ["not tested", "right"]
+    none = parity(midpoint, principal, motions=["products"])
+    assert verdicts(none) == ("right", "not tested")
+    assert "not compared with each other" in none.reason or "is not tested" in none.reason
+
+
+def test_a_program_that_does_not_run_is_wrong(tmp_path):
+    file = tmp_path / "silent.py"
+    file.write_text("")
+    found = parity(shlex.join([sys.executable, str(file)]), midpoint, motions=SMALL)
+    assert verdicts(found) == ("wrong", "right")
+    assert "silent.py is wrong: " in found.reason
 
 
 def test_fresh_motions_and_engines():
@@ -343,6 +355,14 @@ def test_fresh_motions_and_engines():
     found = parity("mujoco:RK4", "pinocchio", seed=7, only=["motions", "parity"])
     assert found.verdict == "right"
     assert found.details.difference.error[0] < 1e-9
+
+
+def test_engines_get_principal_axes_and_are_compared_in_body_axes():
+    """Bodies with products of inertia; measured 3e-7 rad apart, and 2 rad in different axes."""
+    found = parity(midpoint, "mujoco:RK4", motions=["products", "world_tensor"])
+    assert verdicts(found) == ("right", "right")
+    assert found.details.difference.error[0] < 1e-5
+    assert found.details.sweep.steps.between[-1] < 1e-5
 
 
 def program(name):
@@ -382,7 +402,7 @@ def test_known_errors_of_two_back_ends(tmp_path):
     assert recorded.exit_code == 0
     again = parity(BackEnd(without, "a"), BackEnd(midpoint, "b"), motions=FEW, known=known)
     assert (again.verdict, again.exit_code, again.new) == ("wrong", 0, [])
-    worse = parity(BackEnd(without, "a"), BackEnd(without, "b"), motions=FEW, known=known)
+    worse = parity(BackEnd(without, "a"), BackEnd(partial(without), "b"), motions=FEW, known=known)
     assert worse.exit_code == 1
     assert {finding.subject for finding in worse.new} == {"b"}
 
@@ -392,14 +412,15 @@ def test_known_errors_of_two_back_ends(tmp_path):
     [
         (("no_squish", "projected", "reduced", "--pairs"), "3 subjects (no_squish, projected, reduced)"),
         (("no_squish", "--pairs"), "1 subjects (no_squish)"),
-        (("no_squish", "no_squish", "--pairs"), "a second time"),
+        (("no_squish", "--pairs", "projected"), "two subjects go before it: conservative verify projected OTHER --pairs"),
+        (("no_squish", "no_squish", "--pairs"), "the first back end again"),
         (
             ("no_squish", "projected", "--pairs", "--scripts", "scripts"),
             "--scripts, which two subjects with --pairs do not use",
         ),
         (("no_squish", "projected", "--pairs", "--euler", "zyx"), "--euler, which two subjects with --pairs do not use"),
         (("no_squish", "projected", "--pairs", "--only", "pairs"), "checks of two back ends: motions, order, parity"),
-        (("no_squish", "projected", "--picture", "a.svg"), "one recording, or two subjects with --pairs"),
+        (("no_squish", "projected", "--picture", "a.svg"), "--picture, which none of the subjects uses"),
         (("no_squish", "projected", "--pairs", "--pairs=mass"), "--pairs without names and with names"),
     ],
 )
@@ -451,13 +472,25 @@ def test_basilisk_is_judged_as_the_page_says():
     assert orders == pytest.approx([4, 2], abs=0.1)
 
 
+@pytest.mark.slow
+def test_two_versions_are_judged_as_the_page_says(monkeypatch):
+    monkeypatch.undo()  # the environments of this machine
+    try:
+        found = parity("mujoco@3.6.0", "mujoco@4.0.0")
+    except MissingEngine as missing:
+        pytest.skip(str(missing))
+    assert verdicts(found) == ("wrong", "right")
+    orders = [side.order.slope for side in (found.details.sweep.first, found.details.sweep.second)]
+    assert orders == pytest.approx([2, 4], abs=0.1)
+
+
 def test_a_back_end_is_ten_lines():
-    """The most is 9 lines of code: what a user writes for an engine."""
-    for file, functions in {"environment": ("environment", "wrapper", "run"), "unisim": ("first", "second", "run")}.items():
+    """Most is 10 lines, docstring included. Basilisk's simulation around hub and scene takes more, once for both."""
+    of = {"environment": ("environment", "wrapper", "run"), "unisim": ("first", "second", "run"), "basilisk": ("hub", "scene")}
+    for file, functions in of.items():
         tree = ast.parse((EXAMPLES / f"{file}.py").read_text(encoding="utf-8"))
-        of = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef)}
-        for name in functions:
-            assert of[name].end_lineno - of[name].lineno + 1 <= 12
+        nodes = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef)}
+        assert all(nodes[name].end_lineno - nodes[name].lineno + 1 <= 10 for name in functions)
 
 
 def test_the_sweep_of_the_page_is_measured():
@@ -469,7 +502,7 @@ def test_the_sweep_of_the_page_is_measured():
     for row, step, *errors in zip(rows, steps.values, steps.first, steps.second, steps.between, strict=True):
         assert float(row[0]) == pytest.approx(1e3 * step, rel=0.01)
         for text, error in zip(row[1:], errors, strict=True):
-            assert error < 1e-13 if "below" in text else float(text) == pytest.approx(error, rel=0.03)
+            assert error < 1e-13 if "below" in text else float(text) == pytest.approx(rounded_up(error, 2), rel=0.03)
     assert f"{number(steps.agree(1e-3) * 1e3)} ms" in page
     assert steps.agree(1e-6) is None
     picture = (ROOT / "reports" / "pictures" / "two_back_ends.svg").read_text(encoding="utf-8")
