@@ -20,6 +20,7 @@ from conservative.errors import IntegrationFailed
 from conservative.method import Method
 from conservative.references.worker.client import EngineCrashed, EngineError
 
+from ...measures.errors import is_lost
 from ..compare import largest_difference
 from ..finding import Cause, Finding, Verdict
 from .causes import find_causes, usual
@@ -74,6 +75,8 @@ class Relation(StrEnum):
     """The engine answers with an error."""
     LOST = "lost"
     """The first motion ends early or gains energy, and the second one as well or ends early: the step is too long."""
+    ROUNDED = "rounded"
+    """Round-off may turn the body by so much that its attitude is lost, so that equal motions show nothing."""
     NOT_RUN = "not run"
     """The first description does not run, so that nothing can be compared."""
     UNSUPPORTED = "unsupported"
@@ -85,7 +88,7 @@ VERDICTS: Mapping[Relation, Verdict] = MappingProxyType(
         **dict.fromkeys((Relation.SAME_BITS, Relation.EQUAL, Relation.SAME_LIMIT, Relation.NEGLIGIBLE), Verdict.RIGHT),
         **dict.fromkeys((Relation.DIFFERS, Relation.CRASHES), Verdict.WRONG),
         Relation.UNKNOWN: Verdict.UNDECIDED,
-        **dict.fromkeys((Relation.REFUSED, Relation.LOST, Relation.NOT_RUN), Verdict.NOT_TESTED),
+        **dict.fromkeys((Relation.REFUSED, Relation.LOST, Relation.ROUNDED, Relation.NOT_RUN), Verdict.NOT_TESTED),
         **dict.fromkeys((Relation.UNSUPPORTED, Relation.NOT_AVAILABLE), Verdict.NOT_TESTED),
     }
 )
@@ -326,7 +329,10 @@ class _Pair:
         if math.isnan(worst.value):
             return self.finding(Relation.LOST, detail="the step is too long: the first motion is lost or gains energy")
         relation = Relation.EQUAL if worst.value else Relation.SAME_BITS
-        return self.finding(relation, worst, relation.value)
+        detail = str(relation)
+        if is_lost(worst.allowed):
+            relation, detail = Relation.ROUNDED, f"round-off of this engine may turn the body by {worst.allowed:.2g} rad"
+        return self.finding(relation, worst, detail)
 
     def explain(self, apart: Apart) -> PairFinding:
         """Return the finding on a pair that differs: from which size on, whether with shorter steps too, and the simplest."""

@@ -417,6 +417,14 @@ def test_a_second_motion_that_is_lost_shows_nothing_if_the_first_gains_energy(mo
     assert verify_planted(monkeypatch, runner, "turned world")["body: turned world"].relation is relation
 
 
+@pytest.mark.parametrize(("rounding", "relation"), [(10.0, Relation.EQUAL), (1e14, Relation.ROUNDED)])
+def test_equal_motions_show_nothing_where_round_off_may_lose_the_attitude(monkeypatch, rounding, relation):
+    monkeypatch.setattr(verify, "ROUNDING", rounding)
+    found = verify_planted(monkeypatch, Planted(), "turned world")["body: turned world"]
+    assert (found.relation, found.verdict) == (relation, VERDICTS[relation])
+    assert (found.allowed > 1) == (found.verdict is Verdict.NOT_TESTED)  # measured 1e-9 or less, and 80 or more
+
+
 def test_a_moment_of_0_is_not_tested_where_it_is_not_supported(tmp_path):
     """Our own core refuses it, and PROTOCOL.md promises moments above 0 to programs that do not declare it."""
     name = "moment of 0 about the axis of rotation"
