@@ -35,9 +35,7 @@ def pictures(measured: Measured, of_scenes: Mapping[str, Summary]) -> dict[str, 
     main = f"{measured.main_scene.name} ({measured.main_scene.group})"
     first = {main: motions.pop(main)}
     if measured.ratios:
-        study, fields = _drawn(measured)
-        title = f"{len(study.scenes)} random bodies in {len(fields)} fields (geometric mean)"
-        first[title] = random_bodies.summary(measured.rows, measured.ratios).points
+        first[_title(measured)] = random_bodies.summary(measured.rows, measured.ratios).points
     return first | motions
 
 
@@ -45,6 +43,12 @@ def _drawn(measured: Measured) -> tuple[Any, list[str]]:
     """Return the study of random bodies, and its fields."""
     study = next(study for study in measured.plan.studies if study.drawn)
     return study, list(dict.fromkeys(body.field for body in study.drawn))
+
+
+def _title(measured: Measured) -> str:
+    """Return the title of the chart of random bodies."""
+    study, fields = _drawn(measured)
+    return f"{len(study.scenes)} random bodies in {len(fields)} fields (geometric mean)"
 
 
 def first_figure(pictures: Mapping[str, pd.DataFrame]) -> Figure:
@@ -59,8 +63,7 @@ def section(measured: Measured, pictures: Mapping[str, pd.DataFrame]) -> Section
     random = "Random bodies are not in this report; `conservative report --bodies 3` adds them."
     if measured.ratios:
         study, fields = _drawn(measured)
-        points = next(points for title, points in pictures.items() if "random bodies" in title)
-        sentence += " " + _sentence(f"{len(study.scenes)} random bodies", points)
+        sentence += " " + _sentence(f"{len(study.scenes)} random bodies", pictures[_title(measured)])
         random = f"Random bodies: {measured.plan.bodies} in each field ({', '.join(fields)}), with {len(study.lines)} methods."
         random += " `conservative report --bodies N` measures N in each of five fields, with all methods."
     rough = f" {random_bodies.ROUGH}" if all(study.processes == 1 for study in measured.plan.studies) else ""
