@@ -29,7 +29,7 @@ KINDS = {
     "step": tuple(STEPS),
     "attitude": (*ATTITUDES, *DRIFTS),
     "reading": tuple(name for name in READINGS if name not in LEFT_OUT),
-    "time": TIMES,
+    "time": tuple("time shift" if name == "time in ms" else name for name in TIMES),  # a column t may be in ms
     "habit": HABITS,
     "rows": ROWS,
 }
