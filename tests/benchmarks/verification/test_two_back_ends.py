@@ -400,6 +400,7 @@ def test_known_errors_of_two_back_ends(tmp_path):
     known = tmp_path / "known.txt"
     recorded = parity(BackEnd(without, "a"), BackEnd(midpoint, "b"), motions=FEW, record=known)
     assert recorded.exit_code == 0
+    assert "\norder," not in known.read_text()  # of which of the two?
     again = parity(BackEnd(without, "a"), BackEnd(midpoint, "b"), motions=FEW, known=known)
     assert (again.verdict, again.exit_code, again.new) == ("wrong", 0, [])
     worse = parity(BackEnd(without, "a"), BackEnd(partial(without), "b"), motions=FEW, known=known)
