@@ -178,6 +178,18 @@ def bootstrap(logs: Sequence[Sequence[float]]) -> tuple[float, float]:
     return math.exp(low), math.exp(high)
 
 
+def bound_share(count: int, total: int) -> float:
+    """Return the largest share of a population that `count` hits among `total` random members allow, with `CONFIDENCE`.
+
+    One-sided (Clopper & Pearson 1934). Without a hit it is about 3 / total, the rule of three. NaN for a total of 0.
+    """
+    from scipy.special import betaincinv
+
+    if count >= total:
+        return 1.0 if total else math.nan
+    return float(betaincinv(count + 1, total - count, CONFIDENCE))
+
+
 def speed_ratios(
     ours: pd.DataFrame, theirs: pd.DataFrame, scenes: Iterable[str], errors: Sequence[float]
 ) -> tuple[SpeedRatio, ...]:
@@ -227,14 +239,36 @@ class Ratios:
         return sum(not (pair.won or pair.lost) for pair in self.both)
 
     @property
+    def unreached(self) -> int:
+        """Number of cases in which neither side reaches the error."""
+        return sum(pair.ours is None and pair.theirs is None for pair in self.speed_ratios)
+
+    @property
+    def scenes(self) -> int:
+        """Number of bodies of the cases."""
+        return len({pair.scene for pair in self.speed_ratios})
+
+    @property
+    def share_lost(self) -> float:
+        """Largest share of bodies like these on which the other side wins a case (see `bound_share`)."""
+        return bound_share(len({pair.scene for pair in self.speed_ratios if pair.lost}), self.scenes)
+
+    @property
     def ratio(self) -> float:
         """Geometric mean; NaN without a ratio."""
         return math.exp(math.fsum(math.log(pair.ratio) for pair in self.both) / len(self.both)) if self.both else math.nan
 
     @cached_property
     def interval(self) -> tuple[float, float]:
-        """Interval of the geometric mean over bodies and processes like these (see `bootstrap`)."""
-        return bootstrap([pair.logs for pair in self.both])
+        """Interval of the geometric mean over bodies and processes like these (see `bootstrap`).
+
+        The cases of one body are not independent, so that their mean is one value.
+        """
+        cases: dict[str, list[list[float]]] = {}
+        for pair in self.both:
+            cases.setdefault(pair.scene, []).append(pair.logs)
+        means = [[math.fsum(process) / len(process) for process in zip(*logs, strict=False)] for logs in cases.values()]
+        return bootstrap(means)
 
     @property
     def worst(self) -> float:

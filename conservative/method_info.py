@@ -20,7 +20,7 @@ from .features import FIELDS, Features, read_features
 from .version import VERSION
 
 T = TypeVar("T")
-Purpose = Literal["variants", "report", "suite", "many", "pictures", "candidates", "as_installed"]
+Purpose = Literal["variants", "report", "suite", "many", "pictures", "candidates", "as_installed", "fastest"]
 """Purpose of a selection of settings; see `MethodInfo`."""
 
 
@@ -86,6 +86,8 @@ class MethodInfo:
         Settings in a report by default.
     suite
         Settings timed by the benchmark suite.
+    fastest
+        Settings that may be the fastest at some error, for the study of random bodies.
     many
         Settings for which `Method.prepare_many` runs many bodies at once, the representative one first.
     pictures
@@ -122,6 +124,7 @@ class MethodInfo:
     variants: tuple[str, ...] = ("",)
     report: tuple[str, ...] | None = None
     suite: tuple[str, ...] | None = None
+    fastest: tuple[str, ...] | None = None
     many: tuple[str, ...] = ()
     pictures: tuple[str, ...] = ()
     as_installed: tuple[str, ...] = ()

@@ -26,7 +26,7 @@ from conservative.potentials.uniform_gravity import UniformGravity
 from conservative.scene import Scene
 from conservative.trajectory import Counters, Trajectory
 
-from .samples import MATRIX, States, to_body_axes
+from .samples import MATRIX, Delivered, States, to_body_axes
 
 STEP_LIMIT = 10_000_000
 """Largest number of steps of an adaptive engine: minutes of heyoka, an hour of SciPy."""
@@ -150,6 +150,8 @@ class EngineRun:
 
     `bind` returns the loop as a user of the engine would write it, with everything bound before and without limits. It is the
     attribute `own_loop`, which benchmarks time after the first call of the run; by default it is the loop itself.
+    `bind_final` returns the same followed by the shortest conversion of the final state to attitude and rates in body axes. It
+    is the attribute `final_call`, which benchmarks compare with a run of ours; by default it is the run itself.
     """
 
     def __init__(
@@ -157,14 +159,19 @@ class EngineRun:
         loop: Callable[[], Any],
         convert: Callable[[Any], Trajectory],
         bind: Callable[[], Callable[[], Any]] | None = None,
+        bind_final: Callable[[], Callable[[], Delivered]] | None = None,
     ) -> None:
         # So that the first call does not compile the conversion.
         to_body_axes(np.empty(0), States(MATRIX, np.empty((0, 0, 12))), np.empty((0, 3, 3)))
-        self._loop, self._convert, self._bind = loop, convert, bind
+        self._loop, self._convert, self._bind, self._bind_final = loop, convert, bind, bind_final
 
     @cached_property
     def own_loop(self) -> Callable[[], Any]:
         return self._bind() if self._bind else self._loop
+
+    @cached_property
+    def final_call(self) -> Callable[[], Any]:
+        return self._bind_final() if self._bind_final else self
 
     def __call__(self) -> Trajectory:
         return self._convert(self._loop())

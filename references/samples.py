@@ -8,13 +8,14 @@ attitudes without orthonormalisation, so the norm error of a quaternion is visib
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from conservative.attitude import Array
-from conservative.kernels import entry, small
+from conservative.kernels import brief, entry, small
 
 QUATERNION = 0
 """(q, w). For this form and the next two the constants are a rate and an axis (3,), about which D turns in the world, rad/s."""
@@ -28,6 +29,8 @@ AXIS_AND_ANGLE = 4
 """(n, u1, u2, angle about n) of the non-spinning frame; constants as before."""
 RATES_AND_ANGLE = 5
 """(w, angle about l less l t/J3) of a free body, D with its third axis along l; constants: l/J3, rad/s, J1, J2, J3."""
+ROW_AND_ANGLE = 6
+"""(third row of R_DF, angle of a rotation about it after the smallest rotation with this row, w)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,12 +63,42 @@ def to_body_axes(t: Array, states: States, R_BF: Array) -> tuple[Array, Array, A
     """
     n, s, _ = states.values.shape
     R_WB, w_WB_B, finite = np.empty((n, s, 3, 3)), np.empty((n, s, 3)), np.empty(n, np.int64)
+    _convert(states.kind, states.rates_in_world, _owned(t), _owned(states.values), *_axes(states, R_BF), R_WB, w_WB_B, finite)
+    return R_WB, w_WB_B, finite
+
+
+def _owned(array: Any) -> Array:
+    """Return a copy: numba compiles a function again for arrays that are read-only."""
+    return np.array(array, float, order="C")
+
+
+def _axes(states: States, R_BF: Array) -> tuple[Array, Array, Array]:
+    n = len(R_BF)
     R_WD = np.broadcast_to(np.eye(3), (n, 3, 3)) if states.R_WD is None else states.R_WD
     constants = np.zeros((n, 4)) if states.constants is None else states.constants
-    # Copies, because numba compiles a function again for arrays that are read-only.
-    arrays = [np.array(array, float, order="C") for array in (t, states.values, R_BF, constants, R_WD)]
-    _convert(states.kind, states.rates_in_world, *arrays, R_WB, w_WB_B, finite)
-    return R_WB, w_WB_B, finite
+    return _owned(R_BF), _owned(constants), _owned(R_WD)
+
+
+Delivered = tuple[Array, Array]
+"""Final attitude R_WB (3, 3), and rates w_WB_B (3,), rad/s, in new arrays."""
+
+
+def bind_conversion(t_end: float, states: States, R_BF: Array) -> Callable[[Array], Delivered]:
+    """Return the conversion of a state (m,) of one body at one time, s, with everything bound that does not change.
+
+    `states` has the form and the constants of the body; its values are not used. `R_BF` is (3, 3). The result has the digits of
+    `to_body_axes`. It takes 1.3 us; a script in NumPy that multiplies the rotations takes 6 us, and one with a product of a
+    prepared matrix 1.8 us.
+    """
+    kind, in_world, axes = states.kind, states.rates_in_world, [array[0] for array in _axes(states, R_BF[None])]
+    empty = np.empty
+
+    def convert(state: Array) -> Delivered:
+        R_WB, w_WB_B = empty((3, 3)), empty(3)
+        _convert_one(kind, in_world, t_end, state, *axes, R_WB, w_WB_B)
+        return R_WB, w_WB_B
+
+    return convert
 
 
 @small
@@ -135,6 +168,44 @@ def _matrix(A):
     return (A[0, 0], A[0, 1], A[0, 2]), (A[1, 0], A[1, 1], A[1, 2]), (A[2, 0], A[2, 1], A[2, 2])
 
 
+@small
+def _sample(kind, rates_in_world, t, y, R_FB, k, A):
+    if kind == QUATERNION:
+        R, w = _of_quaternion(y[0], y[1], y[2], y[3]), (y[4], y[5], y[6])
+    elif kind == MATRIX:
+        R, w = ((y[0], y[1], y[2]), (y[3], y[4], y[5]), (y[6], y[7], y[8])), (y[9], y[10], y[11])
+    elif kind == ROWS:
+        g, a = (y[0], y[1], y[2]), (y[3], y[4], y[5])
+        second = (g[1] * a[2] - g[2] * a[1], g[2] * a[0] - g[0] * a[2], g[0] * a[1] - g[1] * a[0])
+        R, w = (a, second, g), (y[6], y[7], y[8])
+    elif kind == NON_SPINNING:
+        R = _product(_of_quaternion(y[0], y[1], y[2], y[3]), _about_third(k[0] * t))
+        w = _slow_rates(R, y[4], y[5], k)
+    elif kind == AXIS_AND_ANGLE:
+        R = _product(_least(y[0], y[1], y[2]), _about_third(y[5] + k[0] * t))
+        w = _slow_rates(R, y[3], y[4], k)
+    elif kind == ROW_AND_ANGLE:
+        R, w = _product(_about_third(y[3]), _transpose(_least(y[0], y[1], y[2]))), (y[4], y[5], y[6])
+    else:
+        w = (y[0], y[1], y[2])
+        R = _product(_about_third(k[0] * t + y[3]), _transpose(_least(k[1] * w[0], k[2] * w[1], k[3] * w[2])))
+    if rates_in_world:
+        w = _row(w, R)
+    R = _product(A, R)
+    if kind <= ROWS and k[0] != 0.0:
+        R = _product(_turn(k, t), R)
+    return _product(R, R_FB), _row(w, R_FB)
+
+
+@brief
+def _convert_one(kind, rates_in_world, t, state, R_BF, c, R_WD, R_WB, w_WB_B):
+    k = (c[0], c[1], c[2], c[3])
+    R, w = _sample(kind, rates_in_world, t, state, _transpose(_matrix(R_BF)), k, _matrix(R_WD))
+    for j in range(3):
+        R_WB[j, 0], R_WB[j, 1], R_WB[j, 2] = R[j]
+        w_WB_B[j] = w[j]
+
+
 @entry
 def _convert(kind, rates_in_world, t, states, R_BF, constants, R_WD, R_WB, w_WB_B, finite):
     for body in range(len(states)):
@@ -143,30 +214,7 @@ def _convert(kind, rates_in_world, t, states, R_BF, constants, R_WD, R_WB, w_WB_
         k = (c[0], c[1], c[2], c[3])
         finite[body] = 0
         for i in range(states.shape[1]):
-            y = states[body, i]
-            if kind == QUATERNION:
-                R, w = _of_quaternion(y[0], y[1], y[2], y[3]), (y[4], y[5], y[6])
-            elif kind == MATRIX:
-                R, w = ((y[0], y[1], y[2]), (y[3], y[4], y[5]), (y[6], y[7], y[8])), (y[9], y[10], y[11])
-            elif kind == ROWS:
-                g, a = (y[0], y[1], y[2]), (y[3], y[4], y[5])
-                second = (g[1] * a[2] - g[2] * a[1], g[2] * a[0] - g[0] * a[2], g[0] * a[1] - g[1] * a[0])
-                R, w = (a, second, g), (y[6], y[7], y[8])
-            elif kind == NON_SPINNING:
-                R = _product(_of_quaternion(y[0], y[1], y[2], y[3]), _about_third(k[0] * t[i]))
-                w = _slow_rates(R, y[4], y[5], k)
-            elif kind == AXIS_AND_ANGLE:
-                R = _product(_least(y[0], y[1], y[2]), _about_third(y[5] + k[0] * t[i]))
-                w = _slow_rates(R, y[3], y[4], k)
-            else:
-                w = (y[0], y[1], y[2])
-                R = _product(_about_third(k[0] * t[i] + y[3]), _transpose(_least(k[1] * w[0], k[2] * w[1], k[3] * w[2])))
-            if rates_in_world:
-                w = _row(w, R)
-            R = _product(A, R)
-            if kind <= ROWS and k[0] != 0.0:
-                R = _product(_turn(k, t[i]), R)
-            R, w = _product(R, R_FB), _row(w, R_FB)
+            R, w = _sample(kind, rates_in_world, t[i], states[body, i], R_FB, k, A)
             size = 0.0
             for j in range(3):
                 R_WB[body, i, j, 0], R_WB[body, i, j, 1], R_WB[body, i, j, 2] = R[j]

@@ -171,6 +171,9 @@ def test_the_picture_has_the_chosen_methods_of_the_top(tmp_path):
     assert [name in picture for name in ("taylor", "mujoco", "gauss")] == [True, True, False]
 
 
+DELIVERED = "time per simulated second, final attitude and rates delivered"
+
+
 def study(bodies, processes=5):
     """Return the rows of a study on a spring; each body is a pair of times of both sides, s, or None for a side that misses."""
     rows = []
@@ -181,7 +184,7 @@ def study(bodies, processes=5):
             rows.append(row("random", name, "attitude error max", 1e-13 if time else 1.0, **common))
             for process in range(processes):
                 spent = (time or 1.0) * (1 + 0.02 * (process if role == "ours" else 0))
-                rows.append(row("random", name, "time per simulated second", spent, **common, process=process))
+                rows.append(row("random", name, DELIVERED, spent, **common, process=process))
     return measurement.frame(rows)
 
 
@@ -245,17 +248,19 @@ def test_rows_of_studies_replace_earlier_ones(copied, tmp_path, monkeypatch):
     assert "| heyoka 7.13.2 | < 1e-15" in (copied / "README.md").read_text(encoding="utf-8")
 
 
-def test_typed_tolerances_are_compared_on_the_first_bodies_of_a_study():
+def test_typed_tolerances_are_compared_on_all_bodies_of_a_study():
+    """Each body has its fastest frame, and each of its errors is the error of that frame."""
     rows = []
-    for body, ratio in ((0, 2.0), (1, 8.0), (10, 100.0)):  # the last one is not among the first ten
+    for body, ratio in ((0, 2.0), (1, 8.0), (10, 4.0)):
         place = {"scene": f"random_body:index={body}", "field": "spring", "seed": 1, "body": body}
         for name, role, time, error in (
             ("taylor:tolerance=1e-06", "ours", 1.0, 1e-7),
             ("heyoka:tol=1e-06,frame=lean", "engine", ratio, 2e-7),
+            ("heyoka:tol=1e-06", "engine", 10.0, 1e-3),
         ):
             common = place | {"role": role}
             rows.append(row("random", name, "attitude error max", error * (1 + body), **common))
-            times = (row("random", name, "time per simulated second", time, **common, process=each) for each in range(3))
+            times = (row("random", name, DELIVERED, time, **common, process=each) for each in range(3))
             rows.extend(times)
     found = {
         (typed_row["scene"], typed_row["quantity"]): typed_row["value"]
@@ -264,8 +269,45 @@ def test_typed_tolerances_are_compared_on_the_first_bodies_of_a_study():
     for place in ("spring 1e-06", "all fields 1e-06"):
         assert found[place, "heyoka's time over ours"] == pytest.approx(4)
         assert [found[place, f"heyoka's time over ours, {end}"] for end in ("smallest", "largest")] == pytest.approx([2, 8])
-    assert found["all fields 1e-06", "heyoka, largest error"] == pytest.approx(4e-7)
-    assert found["all fields 1e-06", "ours, median error"] == pytest.approx(1.5e-7)
+    assert found["all fields 1e-06", "heyoka, largest error"] == pytest.approx(11 * 2e-7)
+    assert found["all fields 1e-06", "ours, median error"] == pytest.approx(2e-7)
+    for place in ("spring", "all fields"):
+        assert found[place, "mean ratio"] == pytest.approx(4)
+        assert [found[place, quantity] for quantity in ("bodies", "cases", "cases lost", "smallest ratio")] == pytest.approx(
+            [3, 3, 0, 2]
+        )
+
+
+def test_a_call_has_the_time_of_its_loop_and_what_it_adds():
+    place = {"scene": "random_body:field=spring,seed=1,index=0", "field": "spring", "seed": 1, "body": 0}
+    t_end, rows = cv.scenes.random_body("spring", 1, 0).t_end, []
+    lines = (
+        ("taylor:order=12", "taylor:order=12", "ours", 3e-6, 1e-6),
+        ("taylor:tolerance=1e-06", "taylor:tolerance", "ours", 5e-6, 2e-6),
+        ("heyoka:tol=1e-06", "heyoka", "engine", 9e-6, 1.5e-6),
+        ("gauss", "gauss", "ours", 9e-6, 1.5e-6),
+    )
+    for name, series, role, loop, added in lines:
+        common = place | {"role": role, "series": series}
+        rows.append(row("random", name, "attitude error max", 1e-7, **common))
+        rows.append(row("random", name, "time per simulated second", loop / t_end, **common))
+        rows.append(row("random", name, DELIVERED, (loop + added) / t_end, **common))
+    found = {(each["name"], each["quantity"]): each["value"] for each in load("rows").call_rows(measurement.frame(rows))}
+    expected = {"Taylor, fixed steps": (3, 1), "Taylor, tolerance": (5, 2), "heyoka": (9, 1.5)}
+    assert found == {
+        (f"time of a call, {kind}", quantity): pytest.approx(value)
+        for kind, values in expected.items()
+        for quantity, value in zip(("loop", "added"), values, strict=True)
+    }
+
+
+def test_rows_of_an_earlier_seed_are_replaced():
+    rows = load("rows")
+    common = {"scene": "spring 1e-05", "name": "typed tolerance", "quantity": "heyoka's time over ours"}
+    of_seed = "conservative study random --bodies 20 --seed 7 --methods taylor,heyoka"
+    old = [common | {"command": of_seed}, common | {"scene": "picture", "command": rows.COMMANDS["moving"]}]
+    new = [common | {"scene": "spring 1e-06", "command": rows.COMMANDS["random"]}]
+    assert [row["scene"] for row in rows.replaced(old, new)] == ["picture", "spring 1e-06"]
 
 
 @pytest.fixture

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import jinja2
@@ -19,6 +20,9 @@ HERE = Path(__file__).resolve().parent
 ROWS = HERE / "measured.csv"
 PICTURE, CHOSEN, BODIES, TYPED, MANY = "picture", "chosen method", "random bodies", "typed tolerance", "many bodies"
 """Names or scenes of rows that belong to one part of measured.csv."""
+SINGLE = "single bodies"
+CALLS = "time of a call, "
+"""Beginning of the names of rows about what a call adds to a compiled loop; the kind of the call follows."""
 RATIO, GENERAL = "heyoka's time over ours", "our general integrators"
 SCENES = {
     "brick_flip": "brick, free rotation",
@@ -61,7 +65,8 @@ Values = dict[tuple[str, str, str], float]
 def read_values() -> tuple[Values, dict[str, str], str]:
     """Return the values, the versions by name, and the last date of README's times."""
     rows = read_csv(ROWS)
-    dates = [row["date"] for row in rows if RATIO in row["quantity"] and row["name"] not in (TYPED, MANY)]
+    others = (TYPED, TYPED + LOOPS, MANY)
+    dates = [row["date"] for row in rows if RATIO in row["quantity"] and row["name"] not in others]
     return (
         {(row["scene"], row["name"], row["quantity"]): float(row["value"]) for row in rows},
         {row["name"]: row["version"] for row in rows if row["version"]},
@@ -89,6 +94,7 @@ def render_page(page: str = "README.md") -> str:
         interval=lambda *place: interval(values, *place),
         ratios=sorted(interval(values, *key[:2]) for key in values if key[1:] == (BODIES, RATIO)),
         typed=sorted(interval(values, *key[:2]) for key in values if key[1:] == (TYPED, RATIO) and "all" not in key[0]),
+        typed_count=lambda quantity: int(values["all fields", TYPED, quantity]),
         typed_single=[
             pick(value for key, value in values.items() if key[1:] == (TYPED, f"{RATIO}, {end}"))
             for pick, end in ((min, "smallest"), (max, "largest"))
@@ -193,29 +199,109 @@ def count_unreached(values: Values) -> int:
     return cases - sum(others)
 
 
-def render_bodies() -> str:
+def fields_of(values: Values, name: str) -> list[str]:
+    """Return the fields of the random bodies, in the order of measured.csv."""
+    return list(dict.fromkeys(place.split(" ")[0] for place, *key in values if key == [name, RATIO] and "all" not in place))
+
+
+def ratio_at(values: Values, *place: str) -> str:
+    """Return a ratio with its interval; a dash if it is not measured."""
+    return ratio_text(interval(values, *place)) if (*place, RATIO) in values else "–"
+
+
+def range_text(values: Values, place: str, name: str) -> str:
+    """Return the smallest and the largest ratio on single bodies; a dash if they are not measured."""
+    ends = [values.get((place, name, f"{end} ratio"), math.nan) for end in ("smallest", "largest")]
+    return "–" if math.isnan(ends[0]) else " to ".join(f"{end:#.3g}" for end in ends)
+
+
+def render_bodies(name: str = BODIES) -> str:
     """Return heyoka's time over ours on random bodies, a row for each error and a column for each field."""
     values, *_ = read_values()
-    fields = list(dict.fromkeys(place.split(" ")[0] for place, *key in values if key == [BODIES, RATIO]))
-    lines = [
-        [error, *(ratio_text(interval(values, f"{field} {float(error):g} rad", BODIES)) for field in fields)] for error in SHOWN
-    ]
+    fields = fields_of(values, name)
+    lines = [[error, *(ratio_at(values, f"{field} {float(error):g} rad", name) for field in fields)] for error in SHOWN]
+    lines.append([SINGLE, *(range_text(values, field, name) for field in fields)])
     return table(["error, rad", *(field.replace("_", " ") for field in fields)], lines)
 
 
-def render_typed() -> str:
-    """Return heyoka's time over ours at the same typed tolerance over all fields, and the errors of both sides."""
+def render_typed(name: str = TYPED) -> str:
+    """Return heyoka's time over ours at the same typed tolerance, a row for each tolerance and a column for each field."""
+    values, *_ = read_values()
+    fields = fields_of(values, name)
+    lines = [[typed, *(ratio_at(values, f"{field} {float(typed):g}", name) for field in fields)] for typed in SHOWN]
+    lines.append([SINGLE, *(range_text(values, field, name) for field in fields)])
+    return table(["tolerance", *(field.replace("_", " ") for field in fields)], lines)
+
+
+def render_typed_errors() -> str:
+    """Return the errors of both sides at the same typed tolerance, and heyoka's time over ours over all fields."""
     values, *_ = read_values()
     lines = []
     for typed in SHOWN:
         place = f"all fields {float(typed):g}", TYPED
-        single = " to ".join(f"{values[*place, f'{RATIO}, {end}']:#.3g}" for end in ("smallest", "largest"))
         errors = (
             " to ".join(bound(values[*place, f"{side}, {each} error"], 1) for each in ("median", "largest"))
             for side in ("ours", "heyoka")
         )
-        lines.append([typed, ratio_text(interval(values, *place)), single, *errors])
-    return table(["tolerance", "all fields", "single bodies", "our error, rad", "heyoka's error, rad"], lines)
+        lines.append([typed, ratio_at(values, *place), *errors])
+    return table(["tolerance", "all fields", "our error, rad", "heyoka's error, rad"], lines)
+
+
+def render_cases() -> str:
+    """Return the cases by outcome, a row for each comparison, and the largest share of bodies with a lost case."""
+    values, *_ = read_values()
+    lines = []
+    for name, text in CASES.items():
+        got = {quantity: value for (place, *key, quantity), value in values.items() if [place, *key] == ["all fields", name]}
+        numbers = [f"{got[quantity]:,.0f}" if quantity in got else "–" for quantity in COUNTED]
+        share = got.get("largest share of bodies with a lost case", math.nan)
+        lines.append([text, *numbers, "–" if math.isnan(share) else f"{100 * share:.2g} %"])
+    header = ["comparison", "bodies", "cases", "ours faster", "undecided", "heyoka faster", "bodies with a lost case, at most"]
+    return table(header, lines)
+
+
+CASES = {
+    BODIES: "same error, a user's call",
+    BODIES + LOOPS: "same error, compiled loops",
+    TYPED: "same tolerance, a user's call",
+    TYPED + LOOPS: "same tolerance, compiled loops",
+}
+"""Comparisons on random bodies by the names of their rows."""
+COUNTED = ("bodies", "cases", "cases won", "cases open", "cases lost")
+
+
+def render_calls() -> str:
+    """Return the time of a compiled loop and what a call adds to it, a row for each field."""
+    values, *_ = read_values()
+    kinds = ("Taylor, fixed steps", "Taylor, tolerance", "heyoka")
+    fields = list(dict.fromkeys(place for place, name, _ in values if name.startswith(CALLS)))
+    header = ["field", *(f"{kind}: loop, µs | {kind}: added, µs" for kind in kinds)]
+    lines = [
+        [
+            field.replace("_", " "),
+            *(f"{values[field, f'{CALLS}{kind}', each]:.2g}" for kind in kinds for each in ("loop", "added")),
+        ]
+        for field in fields
+    ]
+    return table(" | ".join(header).split(" | "), lines)
+
+
+def render_price() -> str:
+    """Return the times of single runs of both sides, ms."""
+    values, *_ = read_values()
+    lines = [
+        [text, *(two_digits(1e3 * values.get(("price", side, quantity), math.inf)) for side in ("conservative", "heyoka"))]
+        for quantity, text in PRICES.items()
+    ]
+    return table(["run to 1e-6 rad, ms", "`integrate(scene, error=1e-6)`", "heyoka, tolerance 1e-9"], lines)
+
+
+PRICES = {
+    "one run": "first one of a new process, with imports",
+    "first run of another body": "new body",
+    "next run of the same body": "the same body again",
+}
+"""Rows of the table of single runs, by their quantities."""
 
 
 def render_many() -> str:
@@ -265,5 +351,16 @@ def render_range() -> str:
     )
 
 
-TABLES = {BODIES: render_bodies, TYPED: render_typed, MANY: render_many, "range of ratios": render_range}
+TABLES = {
+    BODIES: render_bodies,
+    f"{BODIES} compiled": partial(render_bodies, BODIES + LOOPS),
+    "cases of random bodies": render_cases,
+    TYPED: render_typed,
+    f"{TYPED} compiled": partial(render_typed, TYPED + LOOPS),
+    f"{TYPED} errors": render_typed_errors,
+    MANY: render_many,
+    "time of a call": render_calls,
+    "price of a run": render_price,
+    "range of ratios": render_range,
+}
 """Tables of times by the name of their mark."""

@@ -34,6 +34,7 @@ class Measure(Enum):
     TIME_PER_STEP_MEDIAN = "time per step median", "s"
     BODY_STEPS = "body-steps per second", "1/s"
     TIME = "time per simulated second", "s/s"
+    TIME_DELIVERED = "time per simulated second, final attitude and rates delivered", "s/s"
     TIME_SAMPLED = "time per simulated second, each step kept", "s/s"
     TIME_OWN_LOOP = "time per simulated second, each step kept, engine's own loop", "s/s"
     TIME_MEDIAN = "time per simulated second median", "s/s"

@@ -7,8 +7,11 @@ same step sizes for every method with a step and the same tolerances for every a
   initial rate (10 to 20 rad of actual rotation for nine in ten of 120 bodies). Asymmetric bodies in a field amplify errors: an
   initial relative error of the rates by a factor of 10 at the median, of 19 or more on one body in ten, and of 1,400 at most.
   Over 48 rad the factor is 33 at the median and 1,400 or more on one body in twenty.
-* The time of a setting is the time of the same motion, final state only, as in all studies (`time_runs`).
-* Settings that cannot be the fastest are not timed, to save time: see `worth_timing`.
+* A setting has two times of the same motion, final state only. `Measure.TIME_DELIVERED` is the time of a user's call, and both
+  sides deliver the attitude R_WB and the rates w_WB_B: a call of our prepared run; an engine's own calls and the conversion of
+  its final state (`speed.final_call`). `Measure.TIME` is the time of the compiled loops alone, as in other studies.
+* Settings that cannot be the fastest are not timed, to save time: see `worth_timing`. Neither at an error, nor among the
+  methods with a tolerance at one of the tolerances `TYPED`.
 
 The reference solution of each body is confirmed by an independent one (`references.truth.confirm`). A body on which they differ
 by more than a tenth of the smallest of `DECADES` is not compared; a row has the reason.
@@ -20,6 +23,7 @@ import itertools
 import math
 from collections.abc import Generator, Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Any
 
 from conservative.attitude import angle_between
@@ -33,7 +37,7 @@ from conservative.references.worker.client import time_limit
 from conservative.scenes.random_body import FIELDS, name_of, random_body
 from conservative.trajectory import Trajectory
 
-from ..measures.measure import Measure, Value
+from ..measures.measure import Measure, Value, blanks
 from ..measures.measurement import Measurement
 from ..measures.processes import Processes
 from ..measures.timing import wall_time
@@ -55,6 +59,10 @@ STEPS = tuple(SAMPLES * k for k in (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 18, 22, 27,
 """Steps of the motion, long to short."""
 TOLERANCES = (0.5, *(10.0**-k for k in range(1, 17)))
 """Tolerances of adaptive methods; heyoka has its lowest order, 2, at the first."""
+TYPED = (1e-3, 1e-6, 1e-9, 1e-12)
+"""Tolerances at which methods are compared as a user types them, who does not know their errors."""
+TIMES = (Measure.TIME_DELIVERED, Measure.TIME)
+"""The times of a setting."""
 FEW = slice(None, None, 2)
 """Step sizes and tolerances of a quick study."""
 ORDER = 4
@@ -65,8 +73,6 @@ MARGIN = 3.0
 """A setting is timed if its estimated time is at most this multiple of the fastest setting's on its side."""
 SLOW, EVERY = 0.01, 3
 """Time, s, of a run above which only every third setting of a line is measured."""
-TIME = Value(Measure.TIME, math.nan)
-"""The time of a setting that is not timed."""
 UNTIMED = Outcome(OutcomeKind.SKIPPED, f"estimated time above {MARGIN:g} times the time of another setting with this error")
 
 
@@ -90,10 +96,10 @@ def random_study(methods: tuple[Method, ...], bodies: int = BODIES, seed: int = 
 def settings(method: Method) -> tuple[Method, ...]:
     """Return the settings of a family, of order `ORDER` or more.
 
-    For our methods these are the candidates of the automatic choice and settings with a tolerance, for engines all settings,
-    and for baselines none.
+    For our methods these are the candidates of the automatic choice and settings with a tolerance, for engines all settings
+    that may be the fastest, and for baselines none.
     """
-    variants = method.settings_for("variants")
+    variants = method.settings_for("fastest")
     if method.role in (Role.OURS, Role.BASELINE):
         approximate = method.method_info.rank is not None and not method.method_info.exact
         variants = (*method.settings_for("candidates"), *filter(tolerance_setting, variants)) if approximate else ()
@@ -145,7 +151,8 @@ def findings(study: Study, progress: Progress) -> Iterator[Measurement]:
             chosen = worth_timing(lines)
             tell(f"{scene.name}: timing {len(chosen)} settings")
             yield from time_rows(study, chosen, processes)
-            yield from (point.case.row(TIME, UNTIMED) for line in lines for point in line if point not in chosen)
+            untimed = (point for line in lines for point in line if point not in chosen)
+            yield from (row for point in untimed for row in point.case.rows(blanks(*TIMES), UNTIMED))
 
 
 def list_cases(case: Case, quick: bool = False) -> list[Case]:
@@ -159,7 +166,8 @@ def find_errors(study: Study, settings: list[Case], truth: Trajectory) -> Genera
     line: Line = []
     for i, case in enumerate(settings):
         slow = bool(line) and line[-1].spent * case.scene.t_end > SLOW
-        if (slow and i % EVERY) or [point.error < FLOOR for point in line[-2:]] == [True, True]:
+        omitted = (slow and i % EVERY) or [point.error < FLOOR for point in line[-2:]] == [True, True]
+        if omitted and typed_tolerance(case.method) is None:
             continue
         done = study.attempt_here(case)
         if isinstance(done, Outcome):
@@ -175,10 +183,11 @@ def find_errors(study: Study, settings: list[Case], truth: Trajectory) -> Genera
 
 
 def worth_timing(lines: Iterable[Line]) -> list[TimedSetting]:
-    """Return the points that can determine the fastest setting for a decade, of our methods or of an engine.
+    """Return the points that can determine the fastest setting of a side, for a decade or at a typed tolerance.
 
-    They belong to lines with an estimated time of at most `MARGIN` times the fastest of the side. Each line contributes the
-    coarsest point that is credited with the decade (see `speed_ratio`), and the one before it.
+    A side is our methods, or an engine. The points belong to lines with an estimated time of at most `MARGIN` times the fastest
+    of the side. Each line contributes the coarsest point that is credited with the decade (see `speed_ratio`), and the one
+    before it, or its point at the tolerance.
     """
     sides: dict[str, list[Line]] = {}
     for line in filter(None, lines):
@@ -191,11 +200,23 @@ def worth_timing(lines: Iterable[Line]) -> list[TimedSetting]:
         for line, seconds in zip(side, costs, strict=True):
             if seconds <= MARGIN * least:
                 chosen.update((line[i], None) for i in list_deciding([p.error for p in line], error))
+    for side, typed in itertools.product(sides.values(), TYPED):
+        points = [point for line in side for point in line if typed_tolerance(point.case.method) == typed]
+        least = min((point.spent for point in points), default=math.nan)
+        chosen.update((point, None) for point in points if point.spent <= MARGIN * least)
     return list(chosen)
 
 
+@lru_cache(maxsize=4096)
+def typed_tolerance(method: Method) -> float | None:
+    """Return the tolerance of a method if it is one of `TYPED`."""
+    setting = tolerance_setting(method)
+    value = None if setting is None else getattr(method, setting)
+    return next((typed for typed in TYPED if value is not None and math.isclose(typed, value)), None)
+
+
 def time_rows(study: Study, points: list[TimedSetting], processes: Processes) -> Iterator[Measurement]:
-    """Yield the times of the points of a body, s per simulated second, final state only, a row for each process."""
+    """Yield the `TIMES` of the points of a body, s per simulated second, final state only, a row for each process."""
     ready: Runs = {}
     with time_limit(study.hang_limit):
         for point in points:
@@ -203,9 +224,9 @@ def time_rows(study: Study, points: list[TimedSetting], processes: Processes) ->
             done = prepare_unchecked(case)
             outcome = done if isinstance(done, Outcome) else check_end(point.trajectory, done[1], point.error)
             if isinstance(done, Outcome) or not outcome.ok:
-                yield case.row(TIME, outcome)
+                yield from case.rows(blanks(*TIMES), outcome)
             else:
-                ready[case, Measure.TIME] = case, done[0]
+                ready.update({(case, measure): (case, done[0]) for measure in TIMES})
         yield from time_runs(study, ready, processes)
 
 

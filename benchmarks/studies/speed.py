@@ -56,6 +56,27 @@ def own_loop(run: Run) -> Callable[[], Any]:
     return getattr(run, "own_loop", run)
 
 
+def final_call(run: Run) -> Callable[[], Any]:
+    """Return the call of a user that delivers the final attitude R_WB and rates w_WB_B.
+
+    It is the run itself, whose trajectory has both. An engine's run has a shorter one: the engine's own calls, and the
+    conversion of the final state alone.
+    """
+    return getattr(run, "final_call", run)
+
+
+_PARTS: dict[Measure, Callable[[Run], Callable[[], Any]]] = {
+    Measure.TIME_SAMPLED: lambda run: run,
+    Measure.TIME_DELIVERED: final_call,
+}
+"""The timed part of a run by the measure of its time. It is `own_loop` for any other one."""
+
+
+def timed_part(run: Run, measure: Measure) -> Callable[[], Any]:
+    """Return the part of a run that a measure times."""
+    return _PARTS.get(measure, own_loop)(run)
+
+
 def attempt_short(study: Study, case: Case) -> tuple[Case, Success | Outcome]:
     """Return the case and its result, with fewer steps if its steps are slow and would exceed the time budget.
 
@@ -163,12 +184,12 @@ def time_once(case: Case, measure: Measure, done: Success) -> Measurement:
 def time_runs(study: Study, ready: Runs, processes: Processes) -> Iterator[Measurement]:
     """Yield the times of runs, s per simulated second, all in interleaved rounds, a row for each process.
 
-    The conversion of samples is included in `Measure.TIME_SAMPLED` only.
+    The measure of a run determines what is timed; see `timed_part`.
     """
     with time_limit(study.hang_limit):
         timings = processes.time(
-            {key: run if key[1] == Measure.TIME_SAMPLED else own_loop(run) for key, (_, run) in ready.items()},
-            {key: partial(prepare_timed, case, key[1] == Measure.TIME_SAMPLED) for key, (case, _) in ready.items()},
+            {key: timed_part(run, key[1]) for key, (_, run) in ready.items()},
+            {key: partial(prepare_timed, case, key[1]) for key, (case, _) in ready.items()},
             limit=study.hang_limit * (1 + len(ready)),
             rounds=study.rounds,
             min_time=CALL,
@@ -180,11 +201,11 @@ def time_runs(study: Study, ready: Runs, processes: Processes) -> Iterator[Measu
         yield from key[0].time_rows(key[1], of_processes, case.grid.dt * case.grid.n_steps)
 
 
-def prepare_timed(case: Case, converted: bool) -> Callable[[], Any]:
-    """Return the timed part of a case, prepared: its run if samples are converted, otherwise its own loop."""
+def prepare_timed(case: Case, measure: Measure) -> Callable[[], Any]:
+    """Return the part of a case that a measure times, prepared."""
     run = case.method.prepare(case.scene, case.grid)
     run()  # so that engines find their limits outside of the loop
-    return run if converted else own_loop(run)
+    return timed_part(run, measure)
 
 
 STUDY = Declaration(findings, named=True, timed=True)

@@ -21,7 +21,7 @@ HIGH_ORDER = 6
 HIGH_LENGTH = 14
 """Number of such step sizes, by a factor of sqrt 2, starting with one step per interval. If the motion between two samples is
 slow, a method of high order is close to round-off with the first one. It then has no observed order."""
-TOLERANCES = (0.5, 0.1, 1e-2, 1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13)
+TOLERANCES = (0.5, 0.1, 1e-2, 1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13, 1e-14)
 """Tolerances of adaptive methods in addition to their own."""
 
 

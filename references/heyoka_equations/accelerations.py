@@ -16,6 +16,7 @@ symbols and floats. `conservative.references.precise` has its own copy of the to
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -43,16 +44,19 @@ Law = tuple[EngineAxes, Acceleration, list[float]]
 """A field: principal axes of the body, ordered for it, its expressions, and the values of their parameters."""
 
 
-def express_field(scene: Scene) -> tuple[Array, Array, Law]:
+def express_field(scene: Scene, axes: EngineAxes | None = None) -> tuple[Array, Array, Law]:
     """Return the field of a scene whose potential, or the potential that turns, is None or one of `READERS`.
 
-    The result is the rotation R_WD (3, 3) whose third column is the field's axis in world axes, the rates (3,) of the axes D,
-    rad/s, in D, and the law. The first rate is 0. The field is constant in D.
+    `axes` are principal axes that the law keeps; by default it orders them. The result is the rotation R_WD (3, 3) whose third
+    column is the field's axis in world axes, the rates (3,) of the axes D, rad/s, in D, and the law. The first rate is 0. The
+    field is constant in D.
     """
-    potential, axes, turn_D = static_part(scene.potential), principal_axes(scene), np.zeros(3)
+    potential, given, turn_D = static_part(scene.potential), axes or principal_axes(scene), np.zeros(3)
     line = None if potential is None else potential.axis_W
-    # A potential without an axis has no torque.
-    law = (axes, uniform, [0.0] * 9) if potential is None or line is None else READERS[type(potential)](axes, potential)
+    if potential is None or line is None:  # a potential without an axis has no torque
+        law: Law = (given, uniform, [0.0] * 9)
+    else:
+        law = READERS[type(potential)](given, potential, axes is not None)
     if not isinstance(scene.potential, Turning):
         return np.eye(3) if line is None else axes_about(line), turn_D, law
     orbit = scene.potential.orbit
@@ -70,14 +74,20 @@ def uniform(parameters: Expressions, g: Expressions) -> list[Expression]:
     return product(parameters, g)
 
 
-def spring(parameters: Expressions, g: Expressions) -> list[Expression]:
+def spring(parameters: Expressions, g: Expressions, last: int = 2) -> list[Expression]:
     """Return (1 - s^-1/2) M g with s = (distance / rest length)^2; parameters as for `_pull`."""
-    return _pull(parameters, g, lambda s: 1.0 - s**-0.5)
+    return _pull(parameters, g, lambda s: 1.0 - s**-0.5, last)
 
 
-def attraction(parameters: Expressions, g: Expressions) -> list[Expression]:
+def attraction(parameters: Expressions, g: Expressions, last: int = 2) -> list[Expression]:
     """Return s^-3/2 M g with s = distance^2; parameters as for `_pull`."""
-    return _pull(parameters, g, lambda s: s**-1.5)
+    return _pull(parameters, g, lambda s: s**-1.5, last)
+
+
+@cache
+def _with_last(acceleration: Callable[..., list[Expression]], last: int) -> Acceleration:
+    """Return a pull whose component `last` follows from the two others: the same object each time, as forms are compared."""
+    return acceleration if last == 2 else partial(acceleration, last=last)
 
 
 def gradient(parameters: Expressions, g: Expressions) -> list[Expression]:
@@ -87,37 +97,54 @@ def gradient(parameters: Expressions, g: Expressions) -> list[Expression]:
     return [x if is_zero(c) else x + c * (a * a - b * b) for x, c, (a, b) in zip(out, parameters[9:], pairs, strict=True)]
 
 
-def _pull(parameters: Expressions, g: Expressions, law: Callable[[Expression], Expression]) -> list[Expression]:
+def _pull(parameters: Expressions, g: Expressions, law: Callable[[Expression], Expression], last: int) -> list[Expression]:
     """Return law(s) M g with s = s0 - s1.g.
 
-    Parameters: two rows of M (6), the coefficients of the third component in the two others (2), s0, and s1 (3).
+    Parameters: the rows of M (6) apart from number `last`, the coefficients of component `last` in the two others (2), s0, and
+    s1 (3).
     """
     along = [c * x for c, x in zip(parameters[9:], g, strict=True) if not is_zero(c)]
     factor = law(parameters[8] - sum(along[1:], along[0]))
     first, second, _ = product([*parameters[:6], 0.0, 0.0, 0.0], g)
     pulled = [first * factor, second * factor]
-    return [*pulled, sum((c * x for c, x in zip(parameters[6:8], pulled, strict=True) if not is_zero(c)), 0.0)]
+    pulled.insert(last, sum((c * x for c, x in zip(parameters[6:8], pulled, strict=True) if not is_zero(c)), 0.0))
+    return pulled
 
 
-def _read_spring(axes: EngineAxes, potential: Any) -> Law:
+def _read_spring(axes: EngineAxes, potential: Any, keep: bool) -> Law:
     if potential.rest_length == 0:
         moment = -potential.stiffness * np.linalg.norm(potential.anchor_W) * (potential.point_B @ axes.R_BF)
         return axes, uniform, _turning(axes, moment)
-    return _read_points(axes, potential, spring, potential.stiffness, potential.rest_length)
+    return _read_points(axes, potential, keep, spring, potential.stiffness, potential.rest_length)
 
 
-def _read_points(axes: EngineAxes, potential: PointPotential, acceleration: Acceleration, strength: float, unit: float) -> Law:
-    """Return the law of a force along the line between two points, from expressions, strength and unit of length."""
+def _read_points(
+    axes: EngineAxes,
+    potential: PointPotential,
+    keep: bool,
+    acceleration: Callable[..., list[Expression]],
+    strength: float,
+    unit: float,
+) -> Law:
+    """Return the law of a force along the line between two points, from expressions, strength and unit of length.
+
+    The component of the acceleration that follows from the two others is along the axis that is nearest to the line. It is the
+    third, so that all bodies have one form, unless `keep` keeps the order of the axes.
+    """
     if not potential.point_B.any():
         return axes, uniform, [0.0] * 9
-    axes = order_axes(axes, int(np.argmax(np.abs(potential.point_B @ axes.R_BF))))
+    last = int(np.argmax(np.abs(potential.point_B @ axes.R_BF)))
+    if not keep:
+        axes, last = order_axes(axes, last), 2
     b, A = _drop_round_off(potential.point_B @ axes.R_BF), float(np.linalg.norm(potential.anchor_W))
-    third = -b[:2] * axes.J[:2] / (b[2] * axes.J[2])
+    two = [i for i in range(3) if i != last]
+    derived = -b[two] * axes.J[two] / (b[last] * axes.J[last])
+    rows = np.reshape(_turning(axes, -strength * A * b), (3, 3))[two]
     distance = np.array([b @ b + A * A, *(2 * A * b)]) / unit**2
-    return axes, acceleration, [*_turning(axes, -strength * A * b)[:6], *third.tolist(), *distance.tolist()]
+    return axes, _with_last(acceleration, last), [*rows.ravel().tolist(), *derived.tolist(), *distance.tolist()]
 
 
-def _read_gradient(axes: EngineAxes, potential: Any) -> Law:
+def _read_gradient(axes: EngineAxes, potential: Any, keep: bool) -> Law:
     inertia = potential.factor * _drop_round_off(axes.R_BF.T @ potential.inertia @ axes.R_BF)
     A, B = np.empty((3, 3)), np.empty(3)
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
@@ -126,13 +153,13 @@ def _read_gradient(axes: EngineAxes, potential: Any) -> Law:
     return axes, gradient, [*(A / axes.J[:, None]).ravel().tolist(), *(B / axes.J).tolist()]
 
 
-READERS: dict[type[Potential], Callable[[EngineAxes, Any], Law]] = {
-    UniformGravity: lambda axes, field: (axes, uniform, _turning(axes, field.moment_B @ axes.R_BF)),
+READERS: dict[type[Potential], Callable[[EngineAxes, Any, bool], Law]] = {
+    UniformGravity: lambda axes, field, keep: (axes, uniform, _turning(axes, field.moment_B @ axes.R_BF)),
     LinearSpring: _read_spring,
-    PointAttraction: lambda axes, field: _read_points(axes, field, attraction, field.strength, 1.0),
+    PointAttraction: lambda axes, field, keep: _read_points(axes, field, keep, attraction, field.strength, 1.0),
     GravityGradient: _read_gradient,
 }
-"""Functions that express a potential, by its type."""
+"""Functions that express a potential, by its type, from principal axes and whether their order is kept."""
 
 
 def order_axes(axes: EngineAxes, third: int) -> EngineAxes:

@@ -84,7 +84,7 @@ def class_of(role: str, method: str) -> MethodClass:
     A method of ours is a general integrator if it supports a random body in a field, whose motion has no closed form. A solver
     has a tolerance, a physics engine a step size.
     """
-    loaded = _load(method)
+    loaded = load_method(method)
     if role == Role.OURS:
         return MethodClass.SOLUTION if loaded and loaded.unsupported(_in_a_field()) else MethodClass.GENERAL
     if role == Role.BASELINE:
@@ -98,7 +98,8 @@ def of_classes(points: pd.DataFrame, *kinds: MethodClass) -> pd.DataFrame:
 
 
 @lru_cache(maxsize=1024)
-def _load(method: str) -> Method | None:
+def load_method(method: str) -> Method | None:
+    """Return the method with a name, None if it cannot be loaded."""
     try:
         return registry.method(method)
     except (BadInput, MissingEngine, NotLoadable):

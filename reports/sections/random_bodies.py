@@ -13,14 +13,14 @@ import pandas as pd
 
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.speed_ratio import LINE, Cheapest, Ratios, costs, speed_ratios
-from conservative.benchmarks.studies.random import DECADES, STUDY
+from conservative.benchmarks.studies.random import DECADES, STUDY, TIMES, TYPED, typed_tolerance
 from conservative.method import Role
 from conservative.outcome import OutcomeKind
 
 from ..charts import figures, vega_embed
 from ..document.cells import DASH, bound, factor, grade_ratio, numeric, ratio_text, tolerance
 from ..document.model import Cell, Emphasis, Figure, Layout, Paragraph, Row, Section, Style, Table, filled
-from ..rows.names import OF_ENGINES, display_name, of_classes, of_study, with_outcome, without_outcome
+from ..rows.names import OF_ENGINES, display_name, load_method, of_classes, of_study, with_outcome, without_outcome
 from ..rows.points import joined, points
 from .summary import MIDDLE, MOST, Summary
 
@@ -32,17 +32,22 @@ MILESTONES = (1e-3, 1e-6, 1e-9, 1e-12)
 """Errors, rad, of the table of engines."""
 ROUGH = "All times are of one process, so ratios are rough: two identical programs differ by several percent."
 TERMS = (
-    "Each body is drawn from a seed: asymmetric, from long and thin to flat, in a rotated frame, with no point and no rate on "
-    "an axis, from slow pendulums to fast tops, in uniform gravity, on a spring, attracted to a point, or in a gravity "
+    "Each body is drawn from a seed: asymmetric, from long and thin to flat, in a rotated frame, with no point and no rate "
+    "on an axis, from slow pendulums to fast tops, in uniform gravity, on a spring, attracted to a point, or in a gravity "
     "gradient, which turns with an orbit or is fixed. The ratio is the fastest engine's time divided by the time of our "
-    "fastest general integrator, each in its fastest form and setting, for the integration of the motion whose error is read, "
-    "final state only, without conversion; above 1 ours is faster. In parentheses is the interval of 95 %: of a body over "
-    "processes, of a mean over bodies and processes. A body is won or lost if 1 is outside of its interval, or if a side is "
-    "alone in reaching the error; otherwise it is open. The error is the largest of twelve instants. The error of a setting "
-    "is the largest of its own and of all finer settings, so isolated good results are ignored. An engine is compared on "
-    "bodies whose field its adapter supports, and on bodies with two reference solutions that agree."
+    "fastest general integrator, each in its fastest form and setting, for the integration of the motion whose error is "
+    "read, final state only; above 1 ours is faster. A user's call is timed, and both sides deliver the attitude and the "
+    "rates in body axes. Compiled loops are the same without this: what our kernels and the engine's own calls take. In "
+    "parentheses is the interval of 95 %: of a body over processes, of a mean over bodies and processes. A body is won or "
+    "lost if 1 is outside of its interval, or if a side is alone in reaching the error; otherwise it is open. The bound of "
+    "bodies lost is one-sided, of 95 %, for bodies of this distribution on this machine; ratios on another processor differ "
+    "by 10 to 20 %. The error is the largest of twelve instants. The error of a setting is the largest of its own and of "
+    "all finer settings, so isolated good results are ignored. An engine is compared on bodies whose field its adapter "
+    "supports, and on bodies with two reference solutions that agree."
 )
 """Explanation of the tables."""
+COMPILED = ("compiled loops, mean", "compiled loops, worst")
+"""Columns of the ratios without what a user's call adds."""
 
 
 @dataclass(frozen=True)
@@ -55,15 +60,23 @@ class RandomRatios(Ratios):
     indices: dict[str, int]
 
 
+@dataclass(frozen=True)
+class TypedRatios(Ratios):
+    """The ratios of the fastest engine's time to ours in one field, both at the same tolerance, whatever errors they reach."""
+
+    field: str
+    tolerance: float
+
+
 def supported_rows(table: pd.DataFrame) -> pd.DataFrame:
     """Return the rows of the study about methods, without those that do not support a field."""
     return without_outcome(of_study(table, STUDY.name), OutcomeKind.UNSUPPORTED)
 
 
-def ratios(table: pd.DataFrame) -> tuple[RandomRatios, ...]:
-    """Return the ratios in named rows of the study: against the fastest engine, then against each one."""
+def ratios(table: pd.DataFrame, time: Measure = TIMES[0]) -> tuple[RandomRatios, ...]:
+    """Return the ratios in named rows of the study, of one of `TIMES`: against the fastest engine, then against each one."""
     rows = supported_rows(table)
-    reached = costs(points(rows, STUDY.name, untimed=True), DECADES)
+    reached = costs(points(rows, STUDY.name, time, untimed=True), DECADES)
     ours, theirs = reached[~reached["class"].isin(OF_ENGINES)], of_classes(reached, *OF_ENGINES)
     taken = rows[rows["role"] == Role.ENGINE]
     engines = list(taken["family"].unique())
@@ -78,6 +91,57 @@ def ratios(table: pd.DataFrame) -> tuple[RandomRatios, ...]:
     return tuple(results)
 
 
+def typed_ratios(table: pd.DataFrame, time: Measure = TIMES[0]) -> tuple[TypedRatios, ...]:
+    """Return the ratios at the tolerances `TYPED` in named rows of the study, of one of `TIMES`.
+
+    Each side has its methods with a tolerance, the fastest of them for each body and tolerance.
+    """
+    rows = typed_points(table, time)
+    ours, theirs = rows[~rows["class"].isin(OF_ENGINES)], of_classes(rows, *OF_ENGINES)
+    if not (len(ours) and len(theirs)):
+        return ()
+    return tuple(
+        TypedRatios(speed_ratios(ours, theirs, bodies["scene"].unique(), [typed]), str(field), typed)
+        for field, bodies in rows.groupby("field", sort=False)
+        for typed in TYPED
+        if (bodies["error"] == typed).any()  # a quick study has every second tolerance
+    )
+
+
+def typed_points(table: pd.DataFrame, time: Measure = TIMES[0]) -> pd.DataFrame:
+    """Return the timed points of the study at the tolerances `TYPED`.
+
+    The columns are those of `points` and `field`; `error` is the tolerance, and `reached` the error, rad.
+    """
+    rows = supported_rows(table)
+    measured = points(rows, STUDY.name, time)
+    tolerances = {name: typed_tolerance(load_method(name)) for name in measured["method"].unique() if load_method(name)}
+    measured = measured.assign(
+        field=measured["scene"].map(dict(zip(rows["scene"], rows["field"], strict=True))),
+        reached=measured["error"],
+        error=measured["method"].map(tolerances).astype(float),
+    )
+    return measured.dropna(subset=["error"]).reset_index(drop=True)
+
+
+def pooled(ratios: Iterable[Ratios]) -> Ratios:
+    """Return the ratios of several groups as one."""
+    return Ratios(tuple(speed_ratio for part in ratios for speed_ratio in part.speed_ratios))
+
+
+def counts(ratios: Iterable[RandomRatios]) -> str:
+    """Return in words the cases against the fastest engine that are won, open and lost, and the bound of bodies lost."""
+    every = pooled(part for part in ratios if part.engine == ANY)
+    if not every.speed_ratios:
+        return ""
+    numbers = f"Won: {every.won}, open: {every.open}, lost: {every.lost}."
+    neither = f" {every.unreached} are reached by neither side." if every.unreached else ""
+    return (
+        f"Cases (one body at one error): {len(every.speed_ratios)}. {numbers}{neither} The cases are of {every.scenes} bodies, "
+        f"so at most {100 * every.share_lost:.2g} % of such bodies have a lost case (95 % confidence)."
+    )
+
+
 def truths(table: pd.DataFrame) -> str:
     """Return in words how well the two reference solutions agree, and on how many bodies they do not."""
     rows = table[(table["study"] == STUDY.name) & (table["measure"] == Measure.AGREEMENT.text)]
@@ -88,15 +152,29 @@ def truths(table: pd.DataFrame) -> str:
     return f"Two reference solutions agree within {bound(good['value'].max(), 1)} rad on {len(good)} bodies.{dropped}"
 
 
-def section(ratios: Sequence[RandomRatios], bodies: int, seed: int, about: str = "") -> Section:
+def section(
+    ratios: Sequence[RandomRatios],
+    bodies: int,
+    seed: int,
+    about: str = "",
+    compiled: Sequence[RandomRatios] = (),
+    typed: Sequence[Sequence[TypedRatios]] = ((), ()),
+) -> Section:
     """Return the section of a report from the ratios; `bodies` is their number in each field, `seed` their seed.
 
-    `about` is the sentence of `truths`.
+    `about` is the sentence of `truths`. `compiled` and the second of `typed` have the ratios of the compiled loops.
     """
     example = f"`conservative run random_body:field=spring,seed={seed},index=0` runs the first on a spring."
     drawn = f"Our closed forms do not solve these motions. Bodies in each field: {bodies}, from seed {seed}; {example}"
     terms = Paragraph(TERMS, Emphasis.NOTE)
-    blocks = filled(Paragraph(f"{drawn} {about}"), figure(ratios, bodies, seed), as_table(ratios), by_engine(ratios), terms)
+    blocks = filled(
+        Paragraph(f"{drawn} {about} {counts(ratios)}"),
+        figure(ratios, bodies, seed),
+        as_table(ratios, compiled),
+        typed_table(*typed),
+        by_engine(ratios),
+        terms,
+    )
     return Section("Random bodies", blocks, "random", "Random bodies", source={"study": STUDY.name})
 
 
@@ -114,10 +192,14 @@ def figure(ratios: Sequence[RandomRatios], bodies: int, seed: int) -> Figure | N
     return Figure("random_bodies", title, text, picture, vega_embed.embed(picture, (), 220), layout=Layout.PAIRS)
 
 
-def as_table(ratios: Iterable[RandomRatios]) -> Table:
-    """Return the ratios against the fastest engine, a row for each field and error."""
+def as_table(ratios: Iterable[RandomRatios], compiled: Iterable[RandomRatios] = ()) -> Table:
+    """Return the ratios against the fastest engine, a row for each field and error.
+
+    If there are ratios of the `compiled` loops, their mean and worst are the last columns.
+    """
+    loops = {(part.field, part.error): part for part in compiled if part.engine == ANY}
     header = ["field", "error, rad", "bodies", "won", "open", "lost", "mean", "worst", "best", "worst body"]
-    header += ["ours, most often", "engine, most often"]
+    header += ["ours, most often", "engine, most often", *(COMPILED if loops else [])]
     rows: list[Row] = [
         [
             ratio.field,
@@ -130,11 +212,39 @@ def as_table(ratios: Iterable[RandomRatios]) -> Table:
             str(ratio.indices[ratio.both[0].scene]) if ratio.both else DASH,
             _most_often(speed_ratio.ours for speed_ratio in ratio.both),
             _most_often(speed_ratio.theirs for speed_ratio in ratio.both),
+            *(_mean_and_worst(loops[ratio.field, ratio.error]) if loops else []),
         ]
         for ratio in ratios
         if ratio.engine == ANY
     ]
     return Table(header, rows, "Random bodies: the fastest engine's time divided by ours", Style.FILTERED)
+
+
+def _mean_and_worst(ratios: Ratios) -> list[Cell]:
+    return [grade_ratio(ratios.ratio, interval=ratios.interval), grade_ratio(ratios.worst)]
+
+
+def typed_table(typed: Sequence[TypedRatios], compiled: Sequence[TypedRatios] = ()) -> Table | None:
+    """Return the ratios at the same tolerance, a row for each field and tolerance; the last columns are of `compiled` loops."""
+    if not typed:
+        return None
+    loops = {(part.field, part.tolerance): part for part in compiled}
+    header = ["field", "tolerance", "bodies", "won", "open", "lost", "mean", "worst", "best", "engine, most often"]
+    rows: list[Row] = [
+        [
+            part.field,
+            numeric(part.tolerance, tolerance(part.tolerance)),
+            count_text(part),
+            *(numeric(count, str(count)) for count in (part.won, part.open, part.lost)),
+            *_mean_and_worst(part),
+            grade_ratio(part.best),
+            _most_often(speed_ratio.theirs for speed_ratio in part.both),
+            *(_mean_and_worst(loops[part.field, part.tolerance]) if loops else []),
+        ]
+        for part in typed
+    ]
+    caption = "Random bodies: the fastest engine's time divided by ours, both at the same tolerance"
+    return Table([*header, *(COMPILED if loops else [])], rows, caption, Style.FILTERED)
 
 
 def _most_often(lines: Iterable[Cheapest | None]) -> str:
@@ -177,6 +287,16 @@ def records(ratios: Iterable[RandomRatios]) -> list[dict[str, Any]]:
     ]
 
 
+def typed_records(typed: Iterable[TypedRatios]) -> list[dict[str, Any]]:
+    """Return the ratios at the same tolerance for JSON."""
+    names = ("field", "tolerance", "won", "open", "lost")
+    return [
+        {name: getattr(part, name) for name in names}
+        | {"both": len(part.both), "mean": part.ratio, "mean_interval": part.interval, "worst": part.worst, "best": part.best}
+        for part in typed
+    ]
+
+
 def chart_points(ratios: Iterable[RandomRatios]) -> pd.DataFrame:
     """Return field, error, mean, worst and best against the fastest engine, where both sides reach the error."""
     rows = [
@@ -197,7 +317,7 @@ def count_text(ratios: Ratios) -> str:
 
 def summary(table: pd.DataFrame, ratios: Sequence[RandomRatios]) -> Summary:
     """Return the summary of named rows of the study and their ratios."""
-    measured = points(supported_rows(table), STUDY.name, untimed=True)
+    measured = points(supported_rows(table), STUDY.name, TIMES[0], untimed=True)
     reached = costs(measured, DECADES, [*LINE, "version", "series"])
     families = map(display_name, reached["family"], reached["version"], [""] * len(reached))
     reached = reached.assign(name=list(families))

@@ -60,7 +60,11 @@ def build(plan: Plan, measurements: Measurements, source: Provenance) -> Documen
         return attempt(f"The section {title!r}", make)
 
     def random_section() -> Section:
-        return random_bodies.section(measured.ratios, plan.bodies, plan.seed, random_bodies.truths(measured.rows))
+        rows = measured.rows
+        compiled = random_bodies.ratios(rows, random.TIMES[1])
+        typed = [random_bodies.typed_ratios(rows, time) for time in random.TIMES]
+        about = random_bodies.truths(rows)
+        return random_bodies.section(measured.ratios, plan.bodies, plan.seed, about, compiled, typed)
 
     details: list[Block] = [part("ratios", lambda: ratios.section(measured))]
     if random.STUDY.name in plan.names:

@@ -33,11 +33,15 @@ def build(name: str, measured: Measurements, made: Mapping[str, str]) -> Documen
     named = with_names(measured.table)
 
     def of_random_bodies() -> list[Block]:
-        ratios = random_bodies.ratios(named)
-        sentence = Paragraph(f"{random_bodies.sentence(ratios)} {random_bodies.truths(named)}")
+        ratios, compiled = (random_bodies.ratios(named, time) for time in random.TIMES)
+        typed = [random_bodies.typed_ratios(named, time) for time in random.TIMES]
+        about = (random_bodies.sentence(ratios), random_bodies.counts(ratios), random_bodies.truths(named))
+        sentence = Paragraph(" ".join(filter(None, about)))
         picture = random_bodies.figure(ratios, named["body"].nunique(), int(named["seed"].max()))
         data["ratios"] = random_bodies.records(ratios)
-        return filled(picture, random_bodies.as_table(ratios), random_bodies.by_engine(ratios), sentence)
+        data["typed"] = random_bodies.typed_records(typed[0])
+        tables = random_bodies.as_table(ratios, compiled), random_bodies.typed_table(*typed), random_bodies.by_engine(ratios)
+        return filled(picture, *tables, sentence)
 
     def of_section() -> list[Block]:
         part = SECTIONS[name].section(named, with_names(measured.samples))

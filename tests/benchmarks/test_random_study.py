@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import conservative as cv
-from conservative.attitude import rotation_about
+from conservative.attitude import angle_between, rotation_about
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.measures.measurement import frame
 from conservative.benchmarks.measures.processes import Processes
@@ -16,6 +16,7 @@ from conservative.benchmarks.speed_ratio import costs
 from conservative.benchmarks.studies import random, selection, studies
 from conservative.benchmarks.studies.case import NOT_DRAWN, Case
 from conservative.benchmarks.studies.random import DECADES, SAMPLES, TimedSetting
+from conservative.benchmarks.studies.speed import timed_part
 from conservative.benchmarks.studies.study import Study
 from conservative.grid import Grid
 from conservative.method import Role
@@ -140,7 +141,7 @@ def test_the_settings_of_each_family():
     ours = {each.name for each in chosen if each.role == Role.OURS}
     assert {"projected", "gauss", "reduced:order=6"} <= ours
     assert "reduced" not in ours  # of order 2
-    assert {each.frame for each in chosen if each.family == "heyoka"} == {"base_vectors", "body", "non_spinning", "lean"}
+    assert {each.frame for each in chosen if each.family == "heyoka"} == {"body", "lean", "angle"}
     assert {each.name for each in chosen if each.family in ("mujoco", "pinocchio")} == {"mujoco", "pinocchio"}
 
 
@@ -165,10 +166,11 @@ def test_the_timed_motion_is_the_one_whose_errors_are_read(monkeypatch):
     monkeypatch.setattr(random, "prepare_unchecked", lambda case: prepared.append(case) or real(case))
     point = line_of(METHODS[0])[3]
     with Processes() as processes:
-        (row,) = random.time_rows(study, [TimedSetting(point, 1e-6, 1e-6, METHODS[0].solve(BODY, point.grid))], processes)
+        rows = list(random.time_rows(study, [TimedSetting(point, 1e-6, 1e-6, METHODS[0].solve(BODY, point.grid))], processes))
     assert [case.grid for case in prepared] == [Grid(point.grid.dt, point.grid.n_steps, point.grid.n_steps)]
     assert prepared[0].grid.dt * prepared[0].grid.n_steps == pytest.approx(BODY.t_end)
-    assert row.value > 0
+    assert [row.measure for row in rows] == list(random.TIMES)
+    assert all(row.value > 0 for row in rows)
 
 
 TIMED = "taylor", "projected", "gauss", "heyoka", "heyoka:frame=base_vectors"
@@ -188,6 +190,73 @@ def test_the_timed_loop_reaches_the_final_state(name, field):
     if not name.startswith("heyoka"):
         assert before.counters.steps == counts[0]
     assert np.array_equal(run().R_WB, before.R_WB)
+
+
+def deliver(value, scene):
+    """Return what the timed call of a user delivers: final attitude and rates. A second call starts again."""
+    run = value.prepare(scene, Grid(scene.t_end, 1, 1))
+    call = timed_part(run, Measure.TIME_DELIVERED)
+    first, second = call(), call()
+    if isinstance(first, cv.Trajectory):
+        assert call is run  # the public call of ours
+        first, second = ((each.R_WB[-1], each.w_WB_B[-1]) for each in (first, second))
+    for before, after in zip(first, second, strict=True):
+        assert np.array_equal(before, after)
+        assert not np.shares_memory(before, after)
+    return first
+
+
+@pytest.mark.parametrize("index", range(2))
+@pytest.mark.parametrize("field", FIELDS)
+def test_both_sides_deliver_the_same_attitude_and_rates(field, index):
+    """Every setting of heyoka that is timed, against `Taylor`: R_WB and w_WB_B of bodies whose axes are not principal axes."""
+    scene = random_body(field, 6001, index)
+    R_WB, w_WB_B = deliver(cv.Taylor(tolerance=1e-15), scene)
+    assert not np.allclose(scene.body.R_BP, np.eye(3), atol=0.1)
+    settings = [setting for setting in random.settings(method("heyoka")) if not setting.unsupported(scene)]
+    assert len(settings) == (4 if field == "gradient" else 5)
+    for setting in settings:
+        R, w = deliver(replace(setting, tol=1e-16), scene)
+        assert angle_between(R, R_WB) < 2e-13, setting.name  # measured: 4.2e-14
+        assert np.abs(w - w_WB_B).max() < 2e-13, setting.name  # measured: 3.3e-14
+    R, w = deliver(method("scipy:rtol=1e-14,loop=compiled"), scene)
+    assert angle_between(R, R_WB) < 2e-12  # measured: 2.1e-13
+    assert np.abs(w - w_WB_B).max() < 2e-12  # measured: 1.3e-13
+
+
+def test_a_user_s_call_and_the_compiled_loop_are_timed(monkeypatch):
+    """In this process and in others: the public call of ours, and heyoka's call with the conversion of its state."""
+    timed, study = {}, random.random_study(METHODS, 1, 3, quick=True)
+
+    class Noting(Processes):
+        def time(self, runs, prepares, *others, **more):
+            timed.update({key: (runs[key], prepares[key]) for key in runs})
+            return {}
+
+    for value in (cv.Taylor(tolerance=1e-6), method("heyoka:tol=1e-6")):
+        point = replace(line_of(value)[0], method=value)
+        with Noting() as processes:
+            trajectory = value.solve(BODY, point.grid)
+            assert not list(random.time_rows(study, [TimedSetting(point, 1.0, 1e-6, trajectory)], processes))
+    assert [(case.method.family, measure) for case, measure in timed] == [
+        (family, measure) for family in ("taylor", "heyoka") for measure in random.TIMES
+    ]
+    for (case, measure), (run, prepare) in timed.items():
+        results = run(), prepare()()
+        if measure is Measure.TIME:  # counts of ours, or heyoka's state
+            assert not any(isinstance(result, cv.Trajectory) for result in results)
+        elif case.method.role is Role.OURS:
+            assert all(isinstance(result, cv.Trajectory) for result in results)
+        else:
+            assert all([part.shape for part in result] == [(3, 3), (3,)] for result in results)
+
+
+def test_settings_at_the_compared_tolerances_are_timed():
+    """Also where they decide no error: here two frames, one of them slower, and one that is slower by more than `MARGIN`."""
+    names = ("taylor:tolerance=1e-06", "heyoka:tol=1e-06", "heyoka:tol=1e-06,frame=lean", "heyoka:tol=1e-06,frame=angle")
+    lines = [[made_up(name, 1.0, spent)] for name, spent in zip(names, (1.0, 2.0, 2.9, 2.0 * random.MARGIN + 0.1), strict=True)]
+    assert random.worth_timing(lines) == [points[0] for points in lines[:3]]
+    assert not random.worth_timing([[made_up("heyoka:tol=1e-05", 1.0, 1.0)]])
 
 
 @pytest.mark.parametrize(

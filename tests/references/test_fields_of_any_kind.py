@@ -7,6 +7,7 @@ world's axes, heyoka has it in axes that turn, and `Projected` has it at the tim
 """
 
 import ctypes
+from dataclasses import replace
 from itertools import product
 from types import SimpleNamespace
 
@@ -25,7 +26,7 @@ from conservative.references.engine import principal_axes
 from conservative.references.engines import pinocchio
 from conservative.references.environments.plain_numbers import describe
 from conservative.references.heyoka_equations import formulations
-from conservative.references.heyoka_equations.accelerations import READERS, express_field
+from conservative.references.heyoka_equations.accelerations import READERS, express_field, order_axes
 from conservative.references.precise import Precise
 from conservative.references.solvers.heyoka import Heyoka
 from conservative.references.solvers.scipy import SciPy
@@ -71,9 +72,13 @@ ATTITUDES = from_quaternion(np.random.default_rng(3).normal(size=(5, 4)))
 ATTITUDES /= np.cbrt(np.linalg.det(ATTITUDES))[:, None, None]
 
 
-def accelerations(scene, parameters=None):
-    """Return angular accelerations (n, 3), body axes, at five attitudes from the expressions, without Euler's terms."""
-    R_WD, _, (axes, acceleration, values) = express_field(scene)
+def accelerations(scene, parameters=None, kept=None):
+    """Return angular accelerations (n, 3), body axes, at five attitudes from the expressions, without Euler's terms.
+
+    The expressions keep the principal axes `kept`.
+    """
+    R_WD, _, (axes, acceleration, values) = express_field(scene, kept)
+    assert kept in (None, axes)
     rows = [(R_WD.T @ R @ axes.R_BF)[2].tolist() for R in ATTITUDES]
     return np.array([acceleration(parameters or values, g) for g in rows]) @ axes.R_BF.T
 
@@ -89,6 +94,17 @@ def test_expressions_are_the_gradients(name):
     scene = scene_in(FIELDS[name])
     expected = from_gradient(scene)
     np.testing.assert_allclose(accelerations(scene), expected, rtol=0, atol=2e-15 * max(np.abs(expected).max(), 1))  # 7e-16
+
+
+@pytest.mark.parametrize("third", range(3))
+@pytest.mark.parametrize("name", FIELDS)
+def test_expressions_in_axes_of_any_order_are_the_gradients(name, third):
+    """As the frame of the angle needs them: the third axis is the one that stays away from the pole, in either direction."""
+    scene = scene_in(FIELDS[name])
+    axes, expected = order_axes(principal_axes(scene), third), from_gradient(scene)
+    for kept in (axes, replace(axes, R_BF=axes.R_BF @ np.diag([1.0, -1.0, -1.0]))):
+        size = max(np.abs(expected).max(), 1)
+        np.testing.assert_allclose(accelerations(scene, kept=kept), expected, rtol=0, atol=3e-15 * size)  # measured 9e-16
 
 
 @pytest.mark.parametrize("name", FIELDS)
@@ -109,10 +125,10 @@ def test_precise_and_engines_support_the_same_fields():
 INTEGRATED = ["gravity", "spring", "attraction", "gradient on another inertia"]
 
 
-FRAMES = [("gradient on another inertia", "base_vectors"), ("spring", "body")]
+FRAMES = [("gradient on another inertia", "base_vectors"), ("spring", "body"), ("attraction", "angle")]
 
 
-@pytest.mark.parametrize(("name", "frame"), sampled(product(INTEGRATED, ["body", "base_vectors"]), 2, keep=FRAMES))
+@pytest.mark.parametrize(("name", "frame"), sampled(product(INTEGRATED, ["body", "base_vectors", "angle"]), 3, keep=FRAMES))
 def test_heyoka_agrees_with_truth(name, frame):
     """Check errors near the tolerance, measured over both frames."""
     scene = scene_in(FIELDS[name])

@@ -7,12 +7,15 @@ import numpy as np
 import pytest
 
 import conservative as cv
+from conservative.grid import Grid
 from conservative.references.environments import catalogue
 from conservative.references.environments.catalogue import MuJoCo, Pinocchio
 from conservative.references.heyoka_equations import formulations
+from conservative.references.heyoka_equations.accelerations import express_field
 from conservative.references.precise import Precise
 from conservative.references.solvers.heyoka import FRAMES, Heyoka
 from conservative.references.solvers.scipy import SciPy
+from conservative.scenes.random_body import random_body
 
 from ..sampling import sampled
 
@@ -25,7 +28,9 @@ from ..sampling import sampled
         (Heyoka(1e-9), "heyoka", "tol=1e-09,body"),
         (Heyoka(1e-9, "lean"), "heyoka", "tol=1e-09,lean"),
         (Heyoka(1e-12, "base_vectors"), "heyoka", "tol=1e-12,base_vectors"),
+        (Heyoka(1e-9, "angle", fast_math="off"), "heyoka", "tol=1e-09,angle,fast_math=off"),
         (SciPy("RK45", 1e-6), "scipy", "RK45,rtol=1e-06"),
+        (SciPy(rtol=1e-15, loop="compiled"), "scipy", "DOP853,rtol=1e-15,compiled"),
         (Precise(128), "heyoka", "128 bits"),
     ],
 )
@@ -50,10 +55,13 @@ BAD = [
     (Heyoka, {"tol": -1e-9}, r"tol: got -1e-09; expected"),
     (Heyoka, {"tol": 1.0}, r"tol: got 1.0; expected"),
     (Heyoka, {"tol": float("nan")}, r"tol: got nan; expected"),
-    (Heyoka, {"frame": "slow"}, r"frame: got 'slow'; expected one of 'body', 'non_spinning', 'lean', 'base_vectors'"),
+    (Heyoka, {"frame": "slow"}, r"frame: got 'slow'; expected one of 'body', 'non_spinning', 'lean', 'base_vectors', 'angle'"),
+    (Heyoka, {"fast_math": True}, r"fast_math: got True; expected one of 'auto', 'on', 'off'"),
     (SciPy, {"integrator": "dop853"}, r"integrator: got 'dop853'; expected one of 'DOP853'"),
     (SciPy, {"rtol": 0.0}, r"rtol: got 0.0; expected a number from 2.3e-14"),
     (SciPy, {"rtol": 1e-15}, r"rtol: got 1e-15; expected"),
+    (SciPy, {"rtol": 1e-16, "loop": "compiled"}, r"rtol: got 1e-16; expected a number from 1e-15"),
+    (SciPy, {"rtol": 1e-14, "loop": "compiled", "integrator": "LSODA"}, r"rtol: got 1e-14; expected a number from 2.3e-14"),
     (SciPy, {"rtol": "tight"}, r"rtol: got 'tight'; expected"),
 ]
 
@@ -110,6 +118,35 @@ def test_lean_takes_the_form_with_the_fewest_products(free, heavy, top, spun):
     assert chosen(over_both_poles) == "non_spinning"
     at_rest = free.rename("rest", w_WB_B0=(0, 0, 0))
     assert chosen(at_rest) == "quaternion"
+
+
+@pytest.mark.parametrize("field", ["gravity", "attraction"])
+def test_the_axis_of_the_angle_is_the_farthest_from_its_pole(field):
+    """Looked at in samples of a precise run, for each of the six axes that it could have."""
+    for index in range(3):
+        scene = random_body(field, 6002, index)
+        run = Precise(96).prepare(scene, Grid(scene.t_end / 500, 500))()
+        R_WD, _, (axes, *_) = express_field(scene, scene.derive(formulations._axes_away_from_pole))
+        g = R_WD[:, 2] @ run.R_WB
+        distances = {sign * k: float((1 + sign * g @ scene.body.R_BP[:, k - 1]).min()) for k in (1, 2, 3) for sign in (1, -1)}
+        chosen = float((1 + g @ axes.R_BF[:, 2]).min())
+        assert chosen == pytest.approx(max(distances.values()), abs=1e-3)  # measured 2e-6
+        assert formulations.angle(scene).start[2] > -1 + chosen - 1e-3
+
+
+def test_an_angle_about_the_axis_of_a_turning_field_is_refused():
+    method = Heyoka(frame="angle")
+    turning, fixed = (random_body(field, 6002, 0) for field in ("gradient", "fixed_gradient"))
+    assert method.unsupported(fixed) is None
+    with pytest.raises(cv.Unsupported, match="needs a field that does not turn"):
+        cv.integrate(turning, 0.1, method)
+
+
+def test_fast_math_makes_another_program(heavy):
+    auto, on, off = (Heyoka(fast_math=value) for value in ("auto", "on", "off"))
+    assert auto.program(heavy) == off.program(heavy) != on.program(heavy)
+    lean_on, base_vectors = Heyoka(frame="lean", fast_math="on"), Heyoka(frame="base_vectors")
+    assert lean_on.program(heavy) == base_vectors.program(heavy) != Heyoka(frame="lean", fast_math="off").program(heavy)
 
 
 def test_one_compiled_integrator_serves_all_scenes_of_a_form(free):

@@ -7,6 +7,7 @@ from dataclasses import replace
 import pandas as pd
 import pytest
 
+from conservative.benchmarks import speed_ratio as speed
 from conservative.benchmarks.measures import measurement
 from conservative.benchmarks.measures.measure import Measure
 from conservative.benchmarks.studies.random import DECADES
@@ -37,7 +38,7 @@ def line(index, method, role, points, field=FIELD, **fields):
     return [
         row("random", method, measure, value, dt, **common)
         for dt, point in enumerate(points)
-        for measure, value in zip((Measure.ATTITUDE_MAX, Measure.TIME), point, strict=True)
+        for measure, value in zip((Measure.ATTITUDE_MAX, Measure.TIME_DELIVERED), point, strict=True)
     ]
 
 
@@ -190,6 +191,53 @@ def test_an_engine_is_compared_on_bodies_that_its_adapter_supports():
     refused = line(1, "scipy", "engine", [(math.nan, math.nan)], outcome="unsupported")
     speed_ratio = against(found(*TWICE, *SLOWER, line(0, "scipy", "engine", flat(9.0)), refused), "scipy")
     assert len(speed_ratio.speed_ratios) == 1
+
+
+def test_a_call_decides_and_compiled_loops_are_the_last_columns():
+    """Ours is faster by a compiled loop, but slower by a call."""
+    error, call = line(0, "gauss", "ours", flat(4.0))
+    ours = [error, call, replace(call, measure=Measure.TIME, value=1.0)]
+    error, call = line(0, "heyoka", "engine", flat(2.0))
+    table = frame([*ours, error, call, replace(call, measure=Measure.TIME, value=2.0)])
+    first, *_ = texts(random_bodies.as_table(ratios(table), ratios(table, Measure.TIME)))
+    assert first[3:7] == ["0", "0", "1", "✗ 0.500"]
+    assert first[-2:] == ["✓ 2.00", "✓ 2.00"]
+    assert "Won: 0, open: 0, lost: 11." in random_bodies.counts(ratios(table))
+    assert "Won: 11, open: 0, lost: 0." in random_bodies.counts(ratios(table, Measure.TIME))
+
+
+def at_tolerance(index, name, role, time, error=1e-7):
+    return line(index, name, role, [(error, time)])
+
+
+def test_at_a_tolerance_the_fastest_frame_of_each_body_decides():
+    """heyoka's quaternion is faster on the first body, base vectors on the second. Errors play no part."""
+    rows = [
+        *at_tolerance(0, "taylor:tolerance=1e-06", "ours", 1.0),
+        *at_tolerance(1, "taylor:tolerance=1e-06", "ours", 1.0, error=1e-3),
+        *(at_tolerance(0, "heyoka:tol=1e-06", "engine", 2.0) + at_tolerance(0, "heyoka:tol=1e-06,frame=lean", "engine", 9.0)),
+        *(at_tolerance(1, "heyoka:tol=1e-06", "engine", 9.0) + at_tolerance(1, "heyoka:tol=1e-06,frame=lean", "engine", 0.5)),
+        *at_tolerance(0, "heyoka:tol=1e-07", "engine", 0.1),  # at a tolerance that is not compared
+        *at_tolerance(0, "gauss", "ours", 0.1),  # without a tolerance
+    ]
+    found = {each.tolerance: each for each in random_bodies.typed_ratios(frame(rows)) if each.both}
+    assert list(found) == [1e-6]
+    assert [pair.ratio for pair in found[1e-6].both] == pytest.approx([0.5, 2.0])
+    assert (found[1e-6].won, found[1e-6].lost) == (1, 1)
+    shown = [row for row in texts(random_bodies.typed_table(random_bodies.typed_ratios(frame(rows)))) if row[1] == "1e-6"]
+    assert [row[3:7] for row in shown] == [["1", "0", "1", "≈ 1.00 (0.500 to 2.00)"]]
+
+
+def test_a_study_without_losses_bounds_the_share_of_bodies():
+    """The rule of three, and Clopper and Pearson's limit for one of ten: 39.4 %."""
+    bodies = [[line(i, "gauss", "ours", flat(1.0)), line(i, "heyoka", "engine", flat(2.0))] for i in range(10)]
+    without = random_bodies.counts(found(*(each for pair in bodies for each in pair)))
+    assert "Cases (one body at one error): 110. Won: 110, open: 0, lost: 0." in without
+    assert "at most 26 % of such bodies" in without  # 1 - 0.05^(1/10)
+    bodies[0][1] = line(0, "heyoka", "engine", flat(0.5))
+    assert "at most 39 % of such bodies" in random_bodies.counts(found(*(each for pair in bodies for each in pair)))
+    assert speed.bound_share(0, 100) == pytest.approx(0.03, rel=0.02)
+    assert math.isnan(speed.bound_share(0, 0))
 
 
 def test_numbers_of_json_are_those_of_the_table():
