@@ -99,7 +99,7 @@ def replaced(old: list[dict[str, str]], new: list[Row]) -> list[Row]:
         for row in old
         if row["command"] not in commands
         and key_of(row) not in places
-        and (row["command"] in order or study_of(row["command"]) not in studies)  # not of an earlier seed
+        and (row["command"] in order or study_of(row["command"]) not in studies or "--seed" not in row["command"])  # an earlier seed
     ]
     return sorted([*kept, *new], key=lambda row: order.index(row["command"]) if row["command"] in order else len(order))
 
