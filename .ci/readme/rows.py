@@ -90,7 +90,7 @@ def command_of(*names: str) -> str:
 
 
 def replaced(old: list[dict[str, str]], new: list[Row]) -> list[Row]:
-    """Return rows in which new ones replace those of the same command, of the same place and quantity, or of an earlier seed."""
+    """Return rows in which new ones replace those of the same command, of the same place, or of an earlier seed."""
     places, commands = {key_of(row) for row in new}, {row["command"] for row in new}
     order = [command_of(*names) for names in MAKERS]
     studies = {study_of(command) for command in commands}
