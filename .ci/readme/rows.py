@@ -90,7 +90,7 @@ def command_of(*names: str) -> str:
 
 
 def replaced(old: list[dict[str, str]], new: list[Row]) -> list[Row]:
-    """Return rows in which new ones replace those of the same command, and those of the same place and quantity."""
+    """Return rows in which new ones replace those of the same command, of the same place, or of an earlier seed."""
     places, commands = {key_of(row) for row in new}, {row["command"] for row in new}
     order = [command_of(*names) for names in MAKERS]
     studies = {study_of(command) for command in commands}
@@ -99,7 +99,7 @@ def replaced(old: list[dict[str, str]], new: list[Row]) -> list[Row]:
         for row in old
         if row["command"] not in commands
         and key_of(row) not in places
-        and (row["command"] in order or study_of(row["command"]) not in studies)  # not of an earlier seed
+        and (row["command"] in order or study_of(row["command"]) not in studies or "--seed" not in row["command"])
     ]
     return sorted([*kept, *new], key=lambda row: order.index(row["command"]) if row["command"] in order else len(order))
 
