@@ -83,10 +83,9 @@ class Rows:
     notes: list[str]
 
 
-def prepare(scene: Scene, recording: Recording, from_row: bool, error: float | None, by: str = "error") -> Rows:
+def prepare(scene: Scene, recording: Recording, from_row: bool, error: float | None) -> Rows:
     """Return the rows of a recording next to the motion of a scene from the first row, or from the scene's start at t = 0.
 
-    `by` says what a given error comes from.
     Raises `BadInput` for times at which the scene has no motion.
     """
     recording, notes = _settle(scene, recording, from_row)
@@ -104,7 +103,7 @@ def prepare(scene: Scene, recording: Recording, from_row: bool, error: float | N
     scale = scale or 1.0
     rounded = _rounded(recording, t, rates, scale)
     noise, resolved = _find_noise(scene, recording, start, float(t[0]) - first, scale, allow(rounded).errors)
-    allowed = allow(rounded, noise, error, by)
+    allowed = allow(rounded, noise, error)
     have = np.array([R is not None, w is not None])
     unknown = have & np.logical_not(resolved) & (len(t) >= FEWEST_FOR_NOISE and error is None)
     inexact = from_row and bool((rounded > 1e-13).any() or (noise > 1e-11).any() or unknown.any())
@@ -133,7 +132,7 @@ def prepare(scene: Scene, recording: Recording, from_row: bool, error: float | N
         if white.any() and (white | (some.errors(*made).max(axis=1) <= case.allowed)).all():
             left = np.sqrt((some.errors(*made) ** 2).mean(axis=1) / 3)
             noise = np.where(white, left, noise)
-            allowed, resolved = allow(rounded, noise, error, by), np.logical_or(resolved, white)
+            allowed, resolved = allow(rounded, noise, error), np.logical_or(resolved, white)
             case = replace(case, allowed=allowed.errors, noise=allowed.noise, open=(False, False))
     return Rows(recording, case, allowed, noise, resolved, notes)
 

@@ -59,7 +59,7 @@ def verify_two(
     BadInput
         For the first recording that cannot be compared, with the name of its file.
     """
-    return verify_both(scene, name_apart(first, second), from_row, (error, error), tell)
+    return verify_both(scene, name_apart(first, second), from_row, error, tell)
 
 
 def name_apart(first: Named, second: Named) -> tuple[Named, Named]:
@@ -73,25 +73,22 @@ def verify_both(
     scene: Scene,
     pair: tuple[Named, Named],
     from_row: bool,
-    errors: tuple[float | None, float | None],
+    error: float | None,
     tell: Callable[[str], object] = lambda _: None,
     decides: str = ". --start scene decides",
-    by: str = "error",
 ) -> Verification:
-    """Verify two recordings with different names, as `verify_two`, each with an allowed error of its own.
+    """Verify two recordings with different names, as `verify_two`.
 
-    `decides` ends the reason if both are right, and differ. `by` says what the allowed errors come from.
+    `decides` ends the reason if both are right, and differ.
     """
     first, second = pair
     rows, made = dict[str, Rows](), dict[str, Verification]()
-    allowed = dict(zip((first[0], second[0]), errors, strict=True))
     # First the recording with attitudes and rates: one without the other takes the missing part of its start from it.
     for name, recording in sorted(pair, key=_missing):
         started = _start(scene, recording, [*zip(rows.values(), made.values(), strict=True)]) if from_row else scene
-        error = allowed[name]
         try:
-            rows[name] = prepare(started.rotation_only, recording, from_row, error, by)
-            made[name] = verify_recording(started, recording, from_row, error, _labelled(tell, name), name, by)
+            rows[name] = prepare(started.rotation_only, recording, from_row, error)
+            made[name] = verify_recording(started, recording, from_row, error, _labelled(tell, name), name)
         except BadInput as refused:
             if refused.argument != "run" or name in str(refused.got):
                 raise  # an option is wrong, or the message names the file already

@@ -7,19 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..compare import LONGEST
+from ..compare import LONGEST, UNITS_OF_DIGITS
 from ..explain import FEWEST
 from ..finding import Finding, Verdict, Verification, uncapitalised
 from ..which import Difference
 from .comparison import prepare
 from .free_body import FreeBody, Freedom, fit_free_body
+from .table import Recording
 from .two import Named, Two, find_difference, join, name_apart, verify_both
 
 ASSUMED = "Without --body, the body is assumed to rotate freely: no field, torque or damping acts on it"
 NEGLIGIBLE = 0.1
 """Errors by the interval of a fitted body, over the allowed errors, that widen no limit."""
-INTERVAL = "digits and the interval of the fitted body"
-"""What allows the error of a recording beside the motion of a body that was fitted to another one."""
 Pair = tuple[Named, Named]
 
 
@@ -56,8 +55,8 @@ def verify_two_alone(
     # The recording that determines its body better first: if both are right, its body explains both.
     for i in sorted((0, 1), key=lambda i: (not fits[i].determined, float(fits[i].sizes.max()))):
         if fits[i].freedom is Freedom.FREE:
-            errors = [_widen(fits[i], recording, error) if i != j else error for j, (_, recording) in enumerate(pair)]
-            made[i] = verify_both(fits[i].scene, pair, True, (errors[0], errors[1]), tell, "", "error" if error else INTERVAL)
+            widened = [(name, recording if i == j else _widen(fits[i], recording)) for j, (name, recording) in enumerate(pair)]
+            made[i] = verify_both(fits[i].scene, (widened[0], widened[1]), True, error, tell, "")
             if all(verification.verdict is Verdict.RIGHT for verification in _parts(made[i])):
                 return _assuming(replace(made[i], reason=f"{made[i].reason}; {_body(fits[i])}"))
     decisive = [i for i in made if fits[i].determined]
@@ -76,14 +75,18 @@ def verify_two_alone(
     return _assuming(_either(pair, fits, made, i))
 
 
-def _widen(fit: FreeBody, recording: object, error: float | None) -> float | None:
-    """Return the error that a recording may have beside the motion of a body whose inertia is known within its intervals."""
-    if error is not None or not fit.determined:
-        return error
-    rows = prepare(fit.scene, recording, True, None)  # type: ignore[arg-type]
+def _widen(fit: FreeBody, recording: Recording) -> Recording:
+    """Return a recording with fewer digits: beside the motion of a body whose inertia is known within its intervals only."""
+    if not fit.determined:
+        return recording
+    rows = prepare(fit.scene, recording, True, None)
     some = rows.case.take(np.unique(np.linspace(0, len(rows.case.t) - 1, FEWEST).astype(int)))
     off = fit.uncertainty(some.first(LONGEST, FEWEST))
-    return float((rows.allowed.errors + off).max()) if (off > NEGLIGIBLE * rows.allowed.errors).any() else None
+    if not (off > NEGLIGIBLE * rows.allowed.errors).any():
+        return recording
+    time, attitude, rate = recording.digits
+    off = off / UNITS_OF_DIGITS * [1.0, rows.case.scale]
+    return replace(recording, digits=(time, attitude + float(off[0]), rate + float(off[1])))
 
 
 def _parts(verification: Verification) -> tuple[Verification, Verification]:

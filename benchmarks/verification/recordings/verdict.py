@@ -173,7 +173,6 @@ def verify_recording(
     error: float | None = None,
     tell: Callable[[str], object] = lambda _: None,
     name: str = "",
-    by: str = "error",
 ) -> Verification:
     """Verify that a recording is a motion of a scene. The result has one finding, and `Details`.
 
@@ -192,8 +191,6 @@ def verify_recording(
         Receives the name of the next piece of work.
     name
         Name of the subject; by default the name of the file.
-    by
-        What the allowed error comes from: the option "error", or words for a sentence.
 
     Raises
     ------
@@ -204,7 +201,7 @@ def verify_recording(
         got = describe(error) if real_number(error) is None else f"{error:g}"
         raise BadInput("error", got, "a finite number of 1e-12 or more, which the exact motion is rounded to")
     name = name or (recording.path.name if recording.path else "recording")
-    rows = prepare(scene.rotation_only, recording, from_row, error, by)
+    rows = prepare(scene.rotation_only, recording, from_row, error)
     recording, notes = rows.recording, rows.notes
     tell("compare")
     comparison = compare(rows.case, recording, from_row)
