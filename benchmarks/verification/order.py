@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from conservative.attitude import Array
 from conservative.check import positive_number
+from conservative.errors import BadInput
 from conservative.number_text import number
 
 from ..measures.convergence_order import MIN_POINTS, SHRINKING, Order, check_points, observed_order
@@ -23,6 +24,8 @@ WITHIN = 0.25
 Another order is shown by twice this difference; between both, the errors are undecided."""
 WIDEST = 0.35
 """Largest half-width of an interval that shows an order."""
+WIDE_PLATEAU = 0.5
+"""The same if local slopes near the expected order show it, as they do where the first ones still change."""
 NEAR = 0.15
 """Largest distance of a fitted order from the next possible one, if the expected order is wrong.
 
@@ -75,6 +78,8 @@ def judge_order(
     positive_number("order", order, "the expected order, a finite number above 0, such as 4")
     positive_number("within", within, "a finite number above 0, such as 0.25")
     h, e = check_points(steps, errors)
+    if not len(h):
+        raise BadInput("steps", "no steps", f"{MIN_POINTS} steps or more")
     found = observed_order(h, e)
     verdict, sentence, shown = _judge(h, e, found, float(order), within, at_least)
     return OrderVerdict(verdict, sentence, _table(h, e, shown), shown)
@@ -119,16 +124,16 @@ def _judge(h: Array, e: Array, found: Order, order: float, within: float, at_lea
 
     A plateau of local slopes shows an order, and so does a precise fit, if the errors scatter.
     """
+    within = within * min(1.0, order)
     plateau = _plateau(h, e, order, within)
-    if plateau and _agree(h, e, plateau, order, within):
-        line = _fit(h, e, plateau, found)
+    if plateau and _agree(h, e, plateau, order, within) and _width(line := _fit(h, e, plateau, found)) <= WIDE_PLATEAU:
         return Verdict.RIGHT, f"{_describe(h, line)}, {order:g} is expected", line
     if found.reason:
-        return Verdict.UNDECIDED, f"the errors do not show an order: {_why_none(e, found)}", found
+        return Verdict.UNDECIDED, f"the errors do not show an order: {_why_none(h, e, found)}", found
     text = _describe(h, found)
     none = f"the errors show no single order: {text}"
     used = sorted(found.used, key=lambda i: -h[i])
-    half = (found.interval[1] - found.interval[0]) / 2
+    half = _width(found)
     if half > WIDEST or (e[used].max() < FALLS * e[used].min() and half > SHARP):
         return Verdict.UNDECIDED, f"{none}. Compute more steps, shorter ones or between these", found
     finer = e[(h < h[used].min()) & np.isfinite(e) & ~(e <= found.floor)]
@@ -140,8 +145,9 @@ def _judge(h: Array, e: Array, found: Order, order: float, within: float, at_lea
         return Verdict.RIGHT, f"{text}, {order:g} is expected", found
     if at_least and found.slope > order + within:
         return Verdict.RIGHT, f"{text}, {order:g} or more is expected", found
+    sharp = half <= SHARP and len(local) >= MIN_POINTS and np.ptp(local) <= 2 * SHARP
     between = local.min() - within <= order <= local.max() + within or abs(found.slope - order) <= 2 * within
-    if near or between or _off(found.slope) > NEAR or _approaches(local, order):
+    if near or (not sharp and (between or _off(found.slope) > NEAR or _approaches(local, order))):
         return Verdict.UNDECIDED, f"{none}, and {order:g} is expected", found
     hint = "; at_least=True allows higher orders" if found.slope > order else ""
     return Verdict.WRONG, f"{text}, but {order:g} is expected{hint}", found
@@ -174,9 +180,12 @@ def _plateau(h: Array, e: Array, order: float, within: float) -> list[int]:
     pairs = [min(a, b) if abs(a - b) <= within else 0.0 for a, b in pairwise(after)]
     settles = max(pairs, default=0.0) > SHRINKING * order or any(min(two) > SHRINKING for two in pairwise(pairs))
     rises = len(after) > 0 and after[0] > order + within
-    plateau = points[first : end + 1]
+    plateau, before = points[first : end + 1], slopes[:first]
+    # A coarser step with an error as small makes the descent chance; a steeper descent before it makes a short one round-off.
+    chance = e[points[:first]].min(initial=math.inf) <= 2 * e[plateau[-1]]
+    tail = len(plateau) <= MIN_POINTS and any(min(a, b) > order + within and abs(a - b) <= within for a, b in pairwise(before))
     short = len(plateau) < MIN_POINTS or e[plateau[0]] < FALLS_AT_LEAST * e[plateau[-1]]
-    return [] if short or settles or rises or _leaves(slopes[first:end], order) else plateau
+    return [] if short or chance or tail or settles or rises or _leaves(slopes[first:end], order) else plateau
 
 
 def _leaves(local: Array, order: float) -> bool:
@@ -209,6 +218,12 @@ def _fit(h: Array, e: Array, points: list[int], found: Order) -> Order:
     return replace(fitted, used=tuple(points[i] for i in fitted.used), floor=found.floor) if not fitted.reason else found
 
 
+def _width(found: Order) -> float:
+    """Return the half-width of the interval of an order."""
+    low, high = found.interval
+    return (high - low) / 2
+
+
 def _describe(h: Array, found: Order) -> str:
     low, high = found.interval
     used = h[list(found.used)]
@@ -220,12 +235,20 @@ def _off(slope: float) -> float:
     return min(abs(slope - possible) for possible in (0.5, 1.5, max(round(slope), 1)))
 
 
-def _why_none(e: Array, found: Order) -> str:
+def _why_none(h: Array, e: Array, found: Order) -> str:
     """Return why there is no fit, and what to do."""
-    finite = np.isfinite(e)
-    if not math.isnan(found.floor) and e[finite].max() < 10 * found.floor:
+    ordered = e[np.argsort(-h)]
+    ordered = ordered[np.isfinite(ordered)]
+    if len(ordered) >= MIN_POINTS and (np.diff(ordered) > 0).all() and ordered[-1] > FALLS_AT_LEAST * ordered[0]:
         return (
-            f"they do not fall with the step, from {number(float(e[finite].max()))} to {number(float(e[finite].min()))}. "
+            f"they grow from {number(float(ordered[0]))} at the longest step to {number(float(ordered[-1]))} at the "
+            "shortest one. "
+            "If the steps are numbers of steps, give step sizes, such as the duration divided by these numbers"
+        )
+    if not math.isnan(found.floor) and ordered.max() < 10 * found.floor:
+        return (
+            f"they do not fall with the step, from {number(float(ordered[0]))} at the longest one to "
+            f"{number(float(ordered[-1]))} at the shortest one. "
             "Round-off, a tolerance of a solver, an error of the reference or a method that does not converge can be the reason"
         )
     floor = "" if math.isnan(found.floor) else f", and fine steps only reach a floor of {number(found.floor)}"
