@@ -63,14 +63,14 @@ Values = dict[tuple[str, str, str], float]
 
 
 def read_values() -> tuple[Values, dict[str, str], str]:
-    """Return the values, the versions by name, and the last date of README's times."""
+    """Return the values, the versions by name, and the dates of README's times: one, or the first and the last one."""
     rows = read_csv(ROWS)
     others = (TYPED, TYPED + LOOPS, MANY)
     dates = [row["date"] for row in rows if RATIO in row["quantity"] and row["name"] not in others]
     return (
         {(row["scene"], row["name"], row["quantity"]): float(row["value"]) for row in rows},
         {row["name"]: row["version"] for row in rows if row["version"]},
-        max(dates),
+        " to ".join(sorted({min(dates), max(dates)})),
     )
 
 
