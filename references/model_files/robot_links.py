@@ -56,6 +56,8 @@ class RobotLink:
         Visual and collision shapes that could be read.
     unread
         Reasons why shapes could not be read.
+    unknown
+        Reason why mass and inertia are not known, such as a missing mesh from which they follow; "" if they are.
     """
 
     link: Link
@@ -64,6 +66,7 @@ class RobotLink:
     written: bool = True
     shapes: Sequence[Shape] = ()
     unread: Sequence[str] = ()
+    unknown: str = ""
 
     @property
     def name(self) -> str:
@@ -144,6 +147,7 @@ def _read_xml(path: Path, kind: str, search: Sequence[Path]) -> list[Robot]:
     robots = []
     for model in models:
         robot, reading = Robot(kind, model.get("name", "") if len(models) > 1 else ""), Reading()
+        reading.invalid += _name_apart(model)
         frames = Description(path, model, search, reading)
         joints: dict[str, Any] = {}
         for joint in frames.joints:
@@ -154,6 +158,23 @@ def _read_xml(path: Path, kind: str, search: Sequence[Path]) -> list[Robot]:
         robot.notes = list(dict.fromkeys([*reading.invalid, *reading.doubts]))
         robots.append(robot)
     return robots
+
+
+def _name_apart(model: Any) -> list[str]:
+    """Give links that have the name of an earlier one another name. Return sentences on them."""
+    names = [link.get("name", "") for link in model.findall("link")]
+    taken, sentences = set[str](), list[str]()
+    for link in model.findall("link"):
+        old = name = link.get("name", "")
+        while name in taken:
+            name += " (again)"
+        if name != old:
+            sentences.append(
+                f"{names.count(old)} links have the name {old!r}; joints to it are read as joints to the first one"
+            )
+            link.set("name", name)
+        taken.add(name)
+    return list(dict.fromkeys(sentences))
 
 
 def _from_root(path: Path, names: Sequence[str], parents: dict[str, str]) -> list[str]:
@@ -255,9 +276,12 @@ def _read_mjcf(path: Path, search: Sequence[Path]) -> Robot:
     from_geometry = int(options.inertiafromgeom) == int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE)
     for name, value in off.items():
         setattr(options, name, value)
+    bodies = [body for body in spec.bodies if body != spec.worldbody]
+    _name_all(bodies)
     unread = _drop_missing_meshes(spec, path, search)
     written: dict[int, tuple[float, Array, bool]] = {}
-    bodies = [body for body in spec.bodies if body != spec.worldbody]
+    empty: dict[int, str] = {}
+    groups = [int(group) for group in options.inertiagrouprange]
     for number, body in enumerate(bodies):
         if body.explicitinertial and not from_geometry:
             full = np.array(body.fullinertia)
@@ -265,8 +289,12 @@ def _read_mjcf(path: Path, search: Sequence[Path]) -> Robot:
             if is_full := bool(np.isfinite(full[0])):
                 tensor = np.array([[full[0], full[3], full[4]], [full[3], full[1], full[5]], [full[4], full[5], full[2]]])
             written[number] = float(body.mass), tensor, is_full
-        elif list(body.geoms) and any(geom.mass != 0 for geom in body.geoms) and body.name not in unread:
+        elif body.name in unread:
+            empty[number] = f"its mass and inertia follow from its shapes: {unread[body.name][0]}"
+        elif any(_weighs(mujoco, geom, groups) for geom in body.geoms):
             continue
+        else:
+            empty[number] = ""
         body.explicitinertial, body.mass, body.inertia = 1, 1.0, np.ones(3)
         body.fullinertia = np.full(6, np.nan)
     try:
@@ -274,7 +302,7 @@ def _read_mjcf(path: Path, search: Sequence[Path]) -> Robot:
     except (ValueError, mujoco.FatalError) as error:
         raise _refused(path, error, "compiles") from None
     mujoco.mj_kinematics(model, data := mujoco.MjData(model))
-    robot, names = Robot("mjcf"), [""] + [body.name or f"body {number}" for number, body in enumerate(bodies)]
+    robot, ids = Robot("mjcf"), [body.id for body in bodies]
     for number, body in enumerate(bodies):
         k = body.id
         R = _matrix(mujoco, model.body_iquat[k])
@@ -282,17 +310,36 @@ def _read_mjcf(path: Path, search: Sequence[Path]) -> Robot:
         if number in written:
             mass, tensor, is_full = written[number]
             frame = make_pose(model.body_ipos[k], None if is_full else R)
-        elif list(body.geoms):
-            mass, tensor, frame = float(model.body_mass[k]), np.diag(model.body_inertia[k]), make_pose(model.body_ipos[k], R)
-        else:
+        elif number in empty:
             mass, tensor, frame = 0.0, np.zeros((3, 3)), np.eye(4)
-        link = Link(pose, mass, frame, tensor, name=names[number + 1], rounding=rounding_of(tensor.ravel().tolist()))
+        else:
+            mass, tensor, frame = float(model.body_mass[k]), np.diag(model.body_inertia[k]), make_pose(model.body_ipos[k], R)
+        link = Link(pose, mass, frame, tensor, name=body.name, rounding=rounding_of(tensor.ravel().tolist()))
         kinds = [mujoco.mjtJoint(joint.type).name.removeprefix("mjJNT_").lower() for joint in body.joints]
-        parent = names[[other.id for other in bodies].index(body.parent.id) + 1] if body.parent.id else ""
+        parent = bodies[ids.index(body.parent.id)].name if body.parent.id else ""
         joint = " ".join(kinds) or ("fixed" if parent else "")
-        missing = unread.get(body.name, [])
-        robot.links.append(RobotLink(link, parent, joint, number in written, _mjcf_shapes(mujoco, model, k), missing))
+        shapes, missing = _mjcf_shapes(mujoco, model, k), unread.get(body.name, [])
+        robot.links.append(RobotLink(link, parent, joint, number in written, shapes, missing, empty.get(number, "")))
     return robot
+
+
+def _name_all(bodies: Sequence[Any]) -> None:
+    """Give bodies without a name one that no other body has."""
+    taken = {body.name for body in bodies}
+    for number, body in enumerate(bodies):
+        if not body.name:
+            name = f"body {number}"
+            while name in taken:
+                name += " (unnamed)"
+            body.name = name
+            taken.add(name)
+
+
+def _weighs(mujoco: Any, geom: Any, groups: Sequence[int]) -> bool:
+    """Return True if a geometry adds to the mass of its body."""
+    if geom.type == mujoco.mjtGeom.mjGEOM_PLANE or not groups[0] <= int(geom.group) <= groups[1]:
+        return False
+    return bool(geom.mass > 0 or (np.isnan(geom.mass) and geom.density > 0))
 
 
 def _parse_mjcf(path: Path, search: Sequence[Path]) -> tuple[Any, Any]:

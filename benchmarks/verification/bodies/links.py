@@ -7,6 +7,7 @@ example-robot-data 6.0.0, with 1,743 links that have a mass.
 from __future__ import annotations
 
 import math
+import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -54,6 +55,8 @@ TURNED = 0.1
 """Relative difference of the inertias of twins with the same moments that shows a wrong sign of a product."""
 MATERIALS = "materials"
 """The reason for a largest density."""
+LARGEST = 1e60
+"""Largest mass, inertia and distance in SI units that products of several of them leave finite; the smallest is its inverse."""
 GRAVITY = 9.81
 """Acceleration of gravity, m/s^2."""
 
@@ -122,9 +125,13 @@ def verify_links(
     read = read_robots(paths, search, tell)
     if len(read) == 1 and isinstance(read[0], Exception):
         raise read[0]
-    unique = len({path.name for path in paths}) == len(paths)
-    names = [path.name if unique else str(path) for path in paths]
-    return [_verify(name, robots) for name, robots in zip(names, read, strict=True)]
+    return [_verify(name, robots) for name, robots in zip(short_names(paths), read, strict=True)]
+
+
+def short_names(paths: Sequence[Path]) -> list[str]:
+    """Return the paths of files relative to the folder that has all of them."""
+    folder = Path(os.path.commonpath([path.absolute().parent for path in paths])) if paths else Path()
+    return [path.absolute().relative_to(folder).as_posix() for path in paths]
 
 
 def _verify(name: str, robots: Sequence[Robot] | Exception) -> Verification:
@@ -132,7 +139,7 @@ def _verify(name: str, robots: Sequence[Robot] | Exception) -> Verification:
         text = f"the file has {reason(robots)}" if isinstance(robots, BadInput) else str(robots)
         finding = LinkFinding(name, "links", "", Verdict.NOT_TESTED, detail=text)
         return Verification(name, "model file", (finding,), "it cannot be read")
-    findings = [finding for robot in robots for finding in judge(robot, name)]
+    findings = [finding for robot in robots for finding in _judge_safely(robot, name)]
     notes = [note for robot in robots for note in _notes(robot)]
     return Verification(name, "model file", tuple(findings), _summary(findings), tuple(dict.fromkeys(notes)))
 
@@ -201,26 +208,59 @@ def find_bodies(links: Sequence[RobotLink]) -> dict[str, Body]:
 # --------------------------------------------------------------------------------------------------------------- the verdict
 
 
+def _judge_safely(robot: Robot, subject: str) -> list[LinkFinding]:
+    """Return the findings of `judge`, or one that says which numbers cannot be computed with. A library goes on after it."""
+    try:
+        with np.errstate(all="ignore"):
+            return judge(robot, subject)
+    except (ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
+        text = f"its numbers cannot be computed with ({type(error).__name__})"
+        return [LinkFinding(subject, "links", robot.name, Verdict.NOT_TESTED, detail=text)]
+
+
+def _unusable(link: RobotLink) -> str:
+    """Return why the numbers of a link cannot be computed with, or are not known; "" if they can."""
+    own = link.link
+    if not (np.isfinite(own.mass) and np.isfinite(own.inertia).all() and np.isfinite(own.frame).all()):
+        return "its mass, centre of mass or inertia is not finite"
+    sizes = np.abs([own.mass, *own.inertia.ravel(), *own.frame[:3, 3]])
+    if sizes.max() > LARGEST or (0 < sizes[0] < 1 / LARGEST) or (own.inertia.any() and np.abs(own.inertia).max() < 1 / LARGEST):
+        return f"its mass, centre of mass or inertia is beyond {LARGEST:.0e} or below {1 / LARGEST:.0e}"
+    return link.unknown
+
+
 def judge(robot: Robot, subject: str) -> list[LinkFinding]:
-    """Return a finding for each link of a robot."""
-    bodies, pairs = find_bodies(robot.links), find_pairs(robot.links)
+    """Return a finding for each link of a robot. Links are told apart by their names, which differ."""
+    unusable = {link.name: text for link in robot.links if (text := _unusable(link))}
+    links = [_emptied(link, unusable[link.name]) if link.name in unusable else link for link in robot.links]
+    bodies, pairs = find_bodies(links), find_pairs(links)
     twin_of = {link.name: (pair, link is pair.right) for pair in pairs for link in (pair.left, pair.right)}
-    faults = {link.name: list(_faults(link, bodies[link.name], twin_of.get(link.name))) for link in robot.links}
+    faults = {link.name: list(_faults(link, bodies[link.name], twin_of.get(link.name))) for link in links}
     for pair in pairs:
         _compare_twins(pair, faults, bodies)
-    return [_finding(link, bodies[link.name], faults[link.name], subject, robot.name) for link in robot.links]
+    return [_finding(link, bodies[link.name], faults[link.name], subject, robot.name) for link in links]
+
+
+def _emptied(link: RobotLink, text: str) -> RobotLink:
+    """Return a link whose mass is not known; its shapes stay."""
+    empty = replace(link.link, mass=0.0, inertia=np.zeros((3, 3)), frame=np.eye(4))
+    return replace(link, link=empty, written=False, unknown=text)
 
 
 def _finding(link: RobotLink, body: Body, faults: Sequence[Fault], subject: str, model: str) -> LinkFinding:
     name = f"{model}: {link.name}" if model else link.name
     moments = tuple(np.linalg.eigvalsh(link.link.inertia).tolist())
     right = LinkFinding(subject, "links", name, Verdict.RIGHT, mass=link.link.mass, moments=moments)
+    if link.unknown:
+        return replace(right, verdict=Verdict.NOT_TESTED, mass=math.nan, moments=(), detail=link.unknown)
     if not faults:
         return right if link.written else replace(right, detail="it has no inertia of its own")
     matter = [fault for fault in faults if not _harmless(link, body, fault)]
     if not matter:
         text = f"{faults[0].text}, which does not change the motion of {body.root.name!r}, to which it is fixed"
         return replace(right, detail=text)
+    if unknown := [member.name for member in body.members if member.unknown]:
+        matter = [_unless_the_rest_decides(fault, part_of(link), unknown[0]) for fault in matter]
     wrong = [fault for fault in matter if fault.verdict is Verdict.WRONG] or matter
     main = wrong[0]
     effects = [fault.effect or _effect(link, body, fault) for fault in wrong]
@@ -240,6 +280,13 @@ def _finding(link: RobotLink, body: Body, faults: Sequence[Fault], subject: str,
         effect="; ".join(dict.fromkeys(filter(None, effects))),
         repair=repair,
     )
+
+
+def _unless_the_rest_decides(fault: Fault, part: Piece, name: str) -> Fault:
+    """Return a fault as undecided if the mass of a link that is fixed to it is not known, and may make it harmless."""
+    if part.flaw:
+        return fault
+    return replace(fault, verdict=Verdict.UNDECIDED, text=f"{fault.text}; it is fixed to {name!r}, whose mass is not known")
 
 
 def _harmless(link: RobotLink, body: Body, fault: Fault) -> bool:
@@ -399,7 +446,9 @@ def _missing(link: RobotLink, body: Body) -> Iterator[Fault]:
     """Yield a fault if a joint moves a body that has shapes and no mass."""
     if link is not body.root or not link.joint or link.joint == "fixed":
         return
-    if any(member.link.mass for member in body.members) or not any(member.shapes for member in body.members):
+    if any(member.link.mass or member.unknown for member in body.members):
+        return
+    if not any(member.shapes or member.unread for member in body.members):
         return
     text = f"the joint to it is {link.joint}, it has shapes, and neither it nor what is fixed to it has a mass"
     yield Fault("no inertial element", text, math.nan, math.nan, "", "")

@@ -9,6 +9,7 @@ import pytest
 from click.testing import CliRunner
 from scipy.spatial.transform import Rotation
 
+from conservative.benchmarks.verification.bodies import links as links_module
 from conservative.benchmarks.verification.bodies import models
 from conservative.benchmarks.verification.bodies.links import judge
 from conservative.benchmarks.verification.bodies.solids import density_of, hull_of, reach
@@ -503,6 +504,137 @@ def test_one_bad_file_of_a_library_is_not_tested_and_alone_it_is_bad_input(libra
     assert (bad.verdict, good.verdict) == (Verdict.NOT_TESTED, Verdict.RIGHT)
     with pytest.raises(BadInput, match="nan"):
         verify(str(broken), only="links")
+
+
+# ------------------------------------------------------------------------------------------- files that are not made for this
+
+
+TRIANGLE = 1e-3 * np.diag([1.0, 1.0, 3.11])
+"""An inertia that no body has, by more than its digits."""
+
+
+def broken_arm():
+    links = arm()
+    links["upper_arm"] = replace(links["upper_arm"], inertia=TRIANGLE)
+    return links
+
+
+def test_a_package_is_a_library_although_it_has_other_files(tmp_path, read_in_this_process):
+    package = tmp_path / "package"
+    for name in ("urdf", "launch", "meshes", ".git"):
+        (package / name).mkdir(parents=True)
+    (package / "package.xml").write_text("<package/>")
+    (package / "CMakeLists.txt").write_text("project(package)")
+    (package / "config.json").write_text('{"a": 1}')
+    (package / "launch" / "a.xml").write_text("<launch/>")
+    (package / "urdf" / "broken.urdf").write_text(urdf(broken_arm()))
+    (package / ".git" / "old.urdf").write_text(urdf(arm()))
+    for only in ("links", ()):
+        (found,) = verify(str(package), only=only)
+        assert (found.subject, found.verdict) == ("broken.urdf", Verdict.WRONG)
+        for name in ("package.xml", "launch/a.xml", "CMakeLists.txt", "config.json"):
+            assert any(name in note for note in found.notes)
+
+
+def test_models_below_a_model_are_verified_by_their_relative_names(tmp_path, read_in_this_process):
+    library = tmp_path / "library"
+    (library / "sub").mkdir(parents=True)
+    (library / "arm.urdf").write_text(urdf(arm()))
+    (library / "sub" / "arm.urdf").write_text(urdf(broken_arm()))
+    (library / "sub" / "empty.urdf").write_text("")
+    (library / "sub" / "scene.xml").write_text('<mujoco><include file="part.xml"/></mujoco>')
+    (library / "sub" / "part.xml").write_text("<mujocoinclude/>")
+    found = verify(str(library), only="links")
+    assert {file.subject: file.verdict for file in found} == {
+        "arm.urdf": Verdict.RIGHT,
+        "sub/arm.urdf": Verdict.WRONG,
+        "sub/empty.urdf": Verdict.NOT_TESTED,
+    }
+    assert any("sub/scene.xml" in note and "sub/part.xml" in note for note in found[0].notes)
+
+
+def test_a_recording_in_a_folder_of_models_needs_a_body(tmp_path, read_in_this_process):
+    (tmp_path / "arm.urdf").write_text(urdf(arm()))
+    (tmp_path / "run.csv").write_text("t,wx,wy,wz\n" + "\n".join(f"{k / 10},1,2,3" for k in range(5)))
+    with pytest.raises(BadInput, match="body"):
+        verify(str(tmp_path))
+    (found,) = verify(str(tmp_path), only="links")
+    assert any("run.csv" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(
+    ("mass", "moment"), [(1e-300, 1e-320), (1e300, 1e300), (1.0, 1e-320), (1e-300, 1.0), (1e300, 0.0), (1.0, 1e155)]
+)
+def test_numbers_beyond_the_range_are_not_tested(tmp_path, mass, moment):
+    links = arm()
+    links["left_finger"] = replace(links["left_finger"], mass=mass, inertia=moment * np.eye(3))
+    found = findings(tmp_path, links)
+    assert found["left_finger"].verdict is Verdict.NOT_TESTED
+    assert {finding.verdict for name, finding in found.items() if name != "left_finger"} == {Verdict.RIGHT}
+
+
+def test_usd_with_numbers_that_are_not_finite_is_not_tested(tmp_path, read_in_this_process):
+    pytest.importorskip("pxr")
+    for name, moments in (("nan.usda", "nan, 200, 200"), ("inf.usda", "inf, 200, 200"), ("ok.usda", "200, 200, 200")):
+        (tmp_path / name).write_text(USD.format(moments=moments, com="0, 0, 0"))
+    found = {file.subject: file.verdict for file in verify(str(tmp_path), only="links")}
+    assert found == {"inf.usda": Verdict.NOT_TESTED, "nan.usda": Verdict.NOT_TESTED, "ok.usda": Verdict.RIGHT}
+
+
+def test_an_error_of_arithmetic_in_one_file_does_not_stop_a_library(library, monkeypatch, read_in_this_process):
+    def fail(robot, subject):
+        raise np.linalg.LinAlgError("no convergence") if subject.startswith("bad") else ZeroDivisionError
+
+    monkeypatch.setattr(links_module, "judge", fail)
+    assert [file.verdict for file in verify(str(library), only="links")] == [Verdict.NOT_TESTED] * 2
+
+
+def test_two_links_of_one_name_are_judged_by_their_own_numbers(tmp_path):
+    for second, verdicts in ((TRIANGLE, ("right", "wrong")), (1e-3 * np.eye(3), ("right", "right"))):
+        link = '<link name="tip"><inertial><mass value="1"/><inertia ixx="{}" iyy="{}" izz="{}"/></inertial></link>'
+        pair = [link.format(*np.diag(tensor)) for tensor in (1e-3 * np.eye(3), second)]
+        found = findings(tmp_path, {}, f'<robot name="r">{"".join(pair)}</robot>')
+        assert tuple(finding.verdict for finding in found.values()) == verdicts
+        assert len(found) == 2
+
+
+def test_bodies_without_a_name_are_told_apart(tmp_path):
+    pytest.importorskip("mujoco")
+    body = '<body{} pos="{} 0 0"><joint/><inertial pos="{} 0 0" mass="3" diaginertia="{}"/>{}</body>'
+    right, box = "0.003125 0.010625 0.0125", '<geom type="box" size="0.1 0.05 0.025"/>'
+    bodies = [
+        body.format("", 0, 0, right, '<geom type="mesh" mesh="m"/>'),
+        body.format("", 1, 0.5, right, box),
+        body.format(' name="body 0"', 2, 0, "3.125e-05 0.00010625 0.000125", box),
+        body.format(' name="body 1"', 3, 0, right, box),
+    ]
+    text = f'<mujoco><asset><mesh name="m" file="gone.stl"/></asset><worldbody>{"".join(bodies)}</worldbody></mujoco>'
+    found = list(findings(tmp_path, {}, text, "m.xml").values())
+    assert [finding.mistake for finding in found] == ["", "centre of mass outside the shapes", "decimal slip", ""]
+
+
+MASSLESS = """<mujoco><asset><mesh name="m" file="gone.stl"/></asset><worldbody><body name="arm"><joint/>{arm}
+<geom type="box" size="0.1 0.05 0.05" {geom}/><body name="camera" pos="0 0 0.05">{camera}</body></body></worldbody></mujoco>"""
+INERTIAL = '<inertial pos="0 0 0" mass="1" diaginertia="{0} {0} {0}"/>'
+
+
+@pytest.mark.parametrize(
+    ("arm_", "geom", "camera", "verdicts"),
+    [
+        ("", 'mass="0"', "", ("wrong", "right")),
+        ("", 'density="0"', "", ("wrong", "right")),
+        ("", "", "", ("right", "right")),
+        ("", 'mass="0"', '<geom type="mesh" mesh="m"/>', ("right", "not tested")),
+        (INERTIAL.format("1e-5"), "", '<geom size="0.01" mass="0"/>', ("wrong", "right")),
+        (INERTIAL.format("1e-5"), "", '<geom type="mesh" mesh="m"/>', ("undecided", "not tested")),
+        (INERTIAL.format("0.003"), "", '<geom type="mesh" mesh="m"/>', ("right", "not tested")),
+    ],
+)  # fmt: skip
+def test_mjcf_without_a_mass(tmp_path, arm_, geom, camera, verdicts):
+    """Geometries of mass 0 have none. A mass that follows from a mesh that is not there is not known."""
+    pytest.importorskip("mujoco")
+    found = findings(tmp_path, {}, MASSLESS.format(arm=arm_, geom=geom, camera=camera), "m.xml")
+    assert tuple(finding.verdict for finding in found.values()) == verdicts
 
 
 def test_engines_are_refused_without_the_check_that_uses_them(library):
