@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -63,7 +63,7 @@ def part_of(link: RobotLink) -> Piece:
 
 
 def find_pairs(links: Sequence[RobotLink]) -> list[Pair]:
-    """Return the pairs of left and right links that have a mass."""
+    """Return the pairs of left and right links that have a mass. A link is not the twin of a link that carries it."""
     by_name = {link.name: link for link in links}
     pairs = [(link, by_name[other]) for link in links if (other := other_side(link.name)) in by_name and _is_left(link.name)]
     plane = _mirror([(left.link.pose[:3, 3], right.link.pose[:3, 3]) for left, right in pairs])
@@ -74,7 +74,19 @@ def find_pairs(links: Sequence[RobotLink]) -> list[Pair]:
         Pair(left, right, _maps(left, right, plane, children))
         for left, right in pairs
         if left.link.mass > 0 and right.link.mass > 0 and left.written and right.written
+        if not (_carries(left, right, by_name) or _carries(right, left, by_name))
     ]
+
+
+def _carries(link: RobotLink, other: RobotLink, by_name: Mapping[str, RobotLink]) -> bool:
+    """Return True if a link is between the root and another one."""
+    seen = set[str]()
+    while other.parent in by_name and other.parent not in seen:
+        if other.parent == link.name:
+            return True
+        seen.add(other.parent)
+        other = by_name[other.parent]
+    return False
 
 
 def other_side(name: str) -> str:
