@@ -304,11 +304,12 @@ def verify(
     if rates is not None:
         choice("rates", rates, ("body", "world"))
         reading["world"] = rates == "world"
-    expanded = expand([os.fspath(subject) for subject in listed if isinstance(subject, str | os.PathLike)])
+    paths = [os.fspath(subject) for subject in listed if isinstance(subject, str | os.PathLike)]
+    expanded = expand(paths)
     for name in only:
         choice("only", name, tuple(CHECKS))
     expanded, notes = _leave_out(expanded, only, body)
-    notes += [note for text in listed if _is_folder(text) for note in look_into(Path(text)).notes]
+    notes += [note for path in map(Path, paths) if path.is_dir() for note in look_into(path).notes]
     kinds = {subject.kind for subject in expanded} | ({Kind.METHOD} if methods else set())
     begin = None if start == "row" else start
     _refuse_unused(

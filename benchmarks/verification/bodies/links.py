@@ -57,6 +57,9 @@ MATERIALS = "materials"
 """The reason for a largest density."""
 SOLID = 12000.0
 """Density of the hull of its shapes, kg/m^3, from which on the shapes of a body may be symbols."""
+MILLIMETRE = 1e-3
+NO_DIGITS = 1e-200
+"""Rounding, kg m^2, below which an inertia has no digits, because it follows from shapes."""
 SPARSEST = 10.0
 """`spread_density`, kg/m^3, below which small shapes that may be symbols do not explain a large inertia."""
 LARGEST = 1e60
@@ -156,6 +159,23 @@ def _notes(robot: Robot) -> Iterator[str]:
         first = next(iter(unread))
         unread_links = f"{count} of {len(robot.links)} links have shapes that are not read, so that less is tested"
         yield f"{unread_links}: {first} (--search FOLDER)"
+    for link in robot.links:
+        if _is_in_millimetres(link):
+            yield f"the shapes of {link.name!r} are 1,000 times as large as its inertia shows: is a mesh in mm?"
+
+
+def _is_in_millimetres(link: RobotLink) -> bool:
+    """Return True if a link has the inertia of its shapes at a thousandth of their size."""
+    if (
+        not link.shapes
+        or not link.link.mass > 0
+        or np.ptp(np.vstack([shape.points for shape in link.shapes]), axis=0).max() < 1
+    ):
+        return False
+    part = part_of(link)
+    return bool(np.isfinite(part.inertia).all()) and any(
+        _is_like(part.inertia * MILLIMETRE**-2, hull, part.mass) for hull in _hulls(link)
+    )
 
 
 def _summary(findings: Sequence[Finding]) -> str:
@@ -242,7 +262,13 @@ def judge(robot: Robot, subject: str) -> list[LinkFinding]:
     faults = {link.name: list(_faults(link, bodies[link.name], twin_of.get(link.name))) for link in links}
     for pair in pairs:
         _compare_twins(pair, faults, bodies)
-    return [_finding(link, bodies[link.name], faults[link.name], subject, robot.name) for link in links]
+    broken = [
+        LinkFinding(
+            subject, "links", robot.name, Verdict.WRONG, detail=text, effect="engines that check it refuse the file"
+        )
+        for text in robot.broken
+    ]  # fmt: skip
+    return broken + [_finding(link, bodies[link.name], faults[link.name], subject, robot.name) for link in links]
 
 
 def _emptied(link: RobotLink, text: str) -> RobotLink:
@@ -411,6 +437,11 @@ def _faults(link: RobotLink, body: Body, twin: tuple[Pair, bool] | None) -> Iter
         return
     own = _hulls(link)
     solid = _solid(part, own)
+    if link.assumed and link is body.root and link.joint and link.joint != "fixed":
+        default = f"{part.mass:g} kg, {part.inertia[0, 0]:g} kg m^2"
+        text = f"the file has no mass and inertia of it, so that the default holds: {default}"
+        yield Fault("placeholder inertia", text, math.nan, math.nan, "", "", solid or _ball(part))
+        return
     sign = _sign(link, part, own) if part.mass > 0 else None
     if sign is not None and sign.expected is not None and not _is_right(link, sign.expected, own, body):
         sign = None
@@ -479,8 +510,8 @@ def _impossible(link: RobotLink, part: Piece, hulls: Sequence[Hull], body: Body,
     text = f"{part.flaw}: {list_numbers(moments)} kg m^2" if part.mass > 0 else f"{part.flaw}: {part.mass:.4g} kg"
     fault = Fault("impossible inertia", text, error, 0.0, "relative", "what a body can have", solid)
     if part.mass > 0 and moments[0] > 0 and part.excess < part.rounding * (1 + 1e-9):
-        text = f"{text}, by less than the rounding of its digits; engines that check it refuse the file"
-        return replace(fault, verdict=Verdict.UNDECIDED, text=text)
+        text, effect = f"{text}, by less than the rounding of its digits", "engines that check it refuse the file"
+        return replace(fault, verdict=Verdict.UNDECIDED, text=text, effect=effect)
     if not part.mass > 0:
         return fault
     mirrored = twin[0].mirrored(twin[1]) if twin else None
@@ -586,7 +617,7 @@ def _size(
     error, allowed, unit, by = (
         (size.density, DENSEST, "kg/m^3", MATERIALS) if size.small else (size.far, FARTHEST[0], "times", "shapes")
     )
-    if is_placeholder(link.link.inertia):
+    if is_placeholder(link.link.inertia) and link.link.rounding > NO_DIGITS:
         fault = Fault("placeholder inertia", text, error, allowed, unit, by, expected)
     elif slips := list(_slips(link, part, hulls, body, size)):
         told = [slip for slip in slips if _agrees_with_twin(slip[0], part, twin)]
@@ -748,7 +779,8 @@ def _centre(link: RobotLink, part: Piece, body: Body) -> Fault | None:
     if len(repairs) == 1:
         repair, com = repairs[0]
         expected = replace(part, com=com)
-    verdict = Verdict.WRONG if relative > OUTSIDE[1] else Verdict.UNDECIDED
+    # A part without shapes of its own may be outside the shapes of what it is fixed to.
+    verdict = Verdict.WRONG if relative > OUTSIDE[1] and link.shapes else Verdict.UNDECIDED
     return Fault(
         "centre of mass outside the shapes", text, relative, OUTSIDE[0], "relative", "shapes", expected, repair, verdict
     )
@@ -827,8 +859,8 @@ def _have_same_shapes(left: Sequence[Hull], right: Sequence[Hull]) -> bool | Non
     differences = []
     for hull, other in zip(left, right, strict=False):
         pairs = [(hull.volume, other.volume), *zip(*(np.linalg.eigvalsh(h.solid.inertia) for h in (hull, other)), strict=True)]
-        differences.append(max(abs(a - b) / max(a, b) for a, b in pairs))
-    return bool(max(differences) < SAME_SHAPES)
+        differences += [float(abs(a - b) / max(a, b)) for a, b in pairs]
+    return max(differences) < SAME_SHAPES
 
 
 def _fits(part: Piece, hulls: Sequence[Hull]) -> bool:

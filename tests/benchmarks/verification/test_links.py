@@ -601,6 +601,134 @@ def test_sdf(tmp_path):
     assert findings(tmp_path, {}, SDF.format(com="0 0.5 0", iyy=0.02), "m.sdf")["base"].mistake.startswith("centre")
 
 
+MOVING = """<sdf version="1.9"><model name="m">{static}<link name="base"><inertial><mass>3</mass><inertia><ixx>0.02</ixx>
+<iyy>0.02</iyy><izz>0.02</izz></inertia></inertial></link><link name="tip">{inertial}
+<visual name="v"><geometry><box><size>0.2 0.2 0.2</size></box></geometry></visual></link>
+<joint name="j" type="{kind}"><parent>base</parent><child>tip</child></joint></model></sdf>"""
+SIX = "<inertial><mass>3</mass><inertia><ixx>0.02</ixx><iyy>0.02</iyy><izz>0.02</izz></inertia></inertial>"
+
+
+@pytest.mark.parametrize(
+    ("static", "inertial", "kind", "verdict"),
+    [
+        ("", "", "revolute", "wrong"),
+        ("", "<inertial/>", "revolute", "wrong"),
+        ("", "<inertial><mass>2</mass></inertial>", "revolute", "wrong"),
+        ("", SIX, "revolute", "right"),
+        ("", "", "fixed", "wrong"),  # it adds 1 kg m^2 to 0.02 kg m^2
+        ("<static>true</static>", "", "revolute", "right"),
+    ],
+)
+def test_the_default_of_sdf_is_a_placeholder(tmp_path, static, inertial, kind, verdict):
+    found = findings(tmp_path, {}, MOVING.format(static=static, inertial=inertial, kind=kind), "m.sdf")["tip"]
+    assert (found.verdict, found.mistake) == (verdict, "placeholder inertia" if verdict == "wrong" else "")
+
+
+def test_links_of_models_within_a_model_of_sdf(tmp_path):
+    """They have joints and twins in other models, and poses of all models that they are in."""
+    arm_ = '<model name="{}_arm"><pose>0 {} 0 0 0 0</pose><link name="l">{}{}</link></model>'
+    visual = '<visual name="v"><geometry><box><size>0.2 0.2 0.2</size></box></geometry></visual>'
+    heavy = SIX.replace("<iyy>0.02", "<iyy>0.03")
+    joints = "".join(
+        f'<joint name="{side}" type="{kind}"><parent>base</parent><child>{side}_arm::l</child></joint>'
+        for side, kind in (("left", "revolute"), ("right", "fixed"))
+    )
+    for inertial, verdict in ((SIX, Verdict.RIGHT), (heavy, Verdict.WRONG)):
+        models_ = arm_.format("left", 0.3, SIX, visual) + arm_.format("right", -0.3, inertial, visual)
+        text = f'<sdf version="1.9"><model name="m"><link name="base">{SIX}{visual}</link>{models_}{joints}</model></sdf>'
+        found = findings(tmp_path, {}, text, "m.sdf")
+        assert {name: finding.verdict for name, finding in found.items() if name != "right_arm::l"} == {
+            "base": Verdict.RIGHT, "left_arm::l": Verdict.RIGHT
+        }  # fmt: skip
+        assert found["right_arm::l"].verdict is verdict
+    (robot,) = read_robots_here(tmp_path / "m.sdf")
+    assert {link.name: (link.joint, link.link.pose[1, 3]) for link in robot.links} == {
+        "base": ("", 0), "left_arm::l": ("revolute", 0.3), "right_arm::l": ("fixed", -0.3)
+    }  # fmt: skip
+
+
+BODY = """#usda 1.0
+(metersPerUnit = 1
+ upAxis = "Z")
+def Xform "a" (prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsMassAPI"])
+{{
+    {body}
+    def Cube "c" ({collision})
+    {{
+        double size = 0.2
+        {collider}
+    }}
+}}
+"""
+COLLIDER = 'prepend apiSchemas = ["PhysicsCollisionAPI", "PhysicsMassAPI"]'
+
+
+@pytest.mark.parametrize(
+    ("body", "collision", "collider", "verdict", "mass"),
+    [
+        ("", COLLIDER, "", "right", 8.0),
+        ("float physics:mass = 2", COLLIDER, "", "right", 2.0),
+        ("float physics:mass = -2", COLLIDER, "", "right", 8.0),  # such a mass does not count
+        ("float physics:mass = 2\n    point3f physics:centerOfMass = (0, 3, 0)", COLLIDER, "", "wrong", 2.0),
+        ("float3 physics:diagonalInertia = (1, 1, 7)", COLLIDER, "", "wrong", 8.0),
+        ("float3 physics:diagonalInertia = (-1, 1, 1)", COLLIDER, "", "wrong", 8.0),
+        (
+            "",
+            COLLIDER,
+            "float physics:mass = 60\n        float3 physics:diagonalInertia = (0.001, 0.001, 0.001)",
+            "wrong",
+            60.0,
+        ),
+        ("", COLLIDER, "float physics:mass = 60", "right", 60.0),
+        ("float physics:mass = 2", "", "", "not tested", np.nan),
+        ("float3 physics:diagonalInertia = (1, 1, 1)", "", "", "not tested", np.nan),
+        ("", "", "", "not tested", np.nan),
+    ],
+)
+def test_usd_with_a_part_of_mass_and_inertia(tmp_path, body, collision, collider, verdict, mass):
+    """The rest follows from the colliders by the rules of ComputeMassProperties; without any it is not tested."""
+    pytest.importorskip("pxr")
+    text = BODY.format(body=body, collision=collision, collider=collider)
+    found = findings(tmp_path, {}, text, "m.usda")["/a"]
+    assert found.verdict == verdict, found
+    assert found.mass == pytest.approx(mass, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("joints", "wrong"),
+    [
+        ((("base", "a"),), 0),
+        ((("base", "gone"),), 1),
+        ((("gone", "a"),), 1),
+        ((("base", "a"), ("b", "a")), 1),
+    ],
+)
+def test_joints_that_parsers_refuse_are_wrong(tmp_path, joints, wrong):
+    links = {"base": arm()["base"], "a": one(3.0)["a"], "b": one(3.0)["a"]}
+    text = urdf({name: replace(link, parent="") for name, link in links.items()})
+    joint = '<joint name="j{}" type="revolute"><parent link="{}"/><child link="{}"/></joint>'
+    text = text.replace("</robot>", "".join(joint.format(k, *ends) for k, ends in enumerate(joints)) + "</robot>")
+    (tmp_path / "m.urdf").write_text(text)
+    (robot,) = read_robots_here(tmp_path / "m.urdf")
+    assert sum(finding.verdict is Verdict.WRONG for finding in judge(robot, "m.urdf")) == wrong
+
+
+def test_options_of_mujoco_that_change_the_masses_are_named(tmp_path):
+    pytest.importorskip("mujoco")
+    for option, named in (('balanceinertia="true"', True), ('boundinertia="0.1"', True), ('autolimits="true"', False)):
+        (tmp_path / "m.xml").write_text(mjcf().replace('balanceinertia="true"', option))
+        (robot,) = read_robots_here(tmp_path / "m.xml")
+        assert any(option.partition("=")[0] in note for note in robot.notes) is named
+
+
+def test_meshes_in_millimetres_are_noted(tmp_path):
+    for scale, noted in ((1000, True), (100, False), (1, False)):
+        text = urdf(one(3.0, boxes=((tuple(scale * np.array(BOX[0])), *BOX[1:]),), inertia=one(3.0)["a"].filled().inertia))
+        (tmp_path / f"{scale}.urdf").write_text(text)
+        (robot,) = read_robots_here(tmp_path / f"{scale}.urdf")
+        assert any("in mm" in note for note in links_module._notes(robot)) is noted
+
+
 COLLADA = """<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset><unit meter="0.01"/></asset>
 <library_geometries><geometry id="g"><mesh><source id="p">
 <float_array id="a" count="12">0 0 0 10 0 0 0 10 0 0 0 10</float_array>
@@ -780,8 +908,8 @@ def test_two_links_of_one_name_are_judged_by_their_own_numbers(tmp_path):
         link = '<link name="tip"><inertial><mass value="1"/><inertia ixx="{}" iyy="{}" izz="{}"/></inertial></link>'
         pair = [link.format(*np.diag(tensor)) for tensor in (1e-3 * np.eye(3), second)]
         found = findings(tmp_path, {}, f'<robot name="r">{"".join(pair)}</robot>')
-        assert tuple(finding.verdict for finding in found.values()) == verdicts
-        assert len(found) == 2
+        assert (found["tip"].verdict, found["tip (again)"].verdict) == verdicts
+        assert found[""].verdict is Verdict.WRONG  # parsers refuse the file
 
 
 def test_bodies_without_a_name_are_told_apart(tmp_path):
@@ -811,6 +939,7 @@ INERTIAL = '<inertial pos="0 0 0" mass="1" diaginertia="{0} {0} {0}"/>'
         ("", 'density="0"', "", ("wrong", "right")),
         ("", "", "", ("right", "right")),
         ("", 'mass="0"', '<geom type="mesh" mesh="m"/>', ("right", "not tested")),
+        ("", "", '<geom size="0.01"/><geom type="mesh" mesh="m" density="0"/>', ("right", "right")),
         (INERTIAL.format("1e-5"), "", '<geom size="0.01" mass="0"/>', ("wrong", "right")),
         (INERTIAL.format("1e-5"), "", '<geom type="mesh" mesh="m"/>', ("undecided", "not tested")),
         (INERTIAL.format("0.003"), "", '<geom type="mesh" mesh="m"/>', ("right", "not tested")),
