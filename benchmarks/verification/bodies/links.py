@@ -183,7 +183,8 @@ def _summary(findings: Sequence[Finding]) -> str:
     wrong = Counter(finding.mistake for finding in findings if finding.verdict is Verdict.WRONG)
     text = f"{counts[Verdict.WRONG]} of {len(findings)} links are wrong"
     text += f" ({', '.join(f'{key}: {count}' for key, count in wrong.most_common())})" if wrong else ""
-    return text + (f", {counts[Verdict.UNDECIDED]} undecided" if counts[Verdict.UNDECIDED] else "")
+    others = [f", {counts[verdict]} {verdict}" for verdict in (Verdict.UNDECIDED, Verdict.NOT_TESTED) if counts[verdict]]
+    return text + "".join(others)
 
 
 # -------------------------------------------------------------------------------------------------------- bodies of a robot
@@ -693,7 +694,7 @@ def _moved_twice(link: RobotLink, part: Piece, hulls: Sequence[Hull], body: Body
         if np.linalg.norm(part.inertia - own) < ORIGIN[3] * np.linalg.norm(own):
             return None
     exact = any(
-        np.linalg.norm(moved.inertia - own) < max(part.rounding, tolerance * np.linalg.norm(own))
+        np.linalg.norm(moved.inertia - own) < max(part.rounding, tolerance * float(np.linalg.norm(own)))
         for own in (hull.solid.inertia * part.mass for hull in hulls)
     )
     return moved if exact or (size.large and any(_is_like(moved.inertia, hull, part.mass) for hull in hulls)) else None

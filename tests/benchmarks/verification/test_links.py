@@ -15,7 +15,7 @@ from conservative.benchmarks.verification.bodies import models
 from conservative.benchmarks.verification.bodies.links import judge
 from conservative.benchmarks.verification.bodies.solids import density_of, hull_of, reach
 from conservative.benchmarks.verification.bodies.twins import other_side
-from conservative.benchmarks.verification.finding import Verdict
+from conservative.benchmarks.verification.finding import Finding, Verdict, Verification
 from conservative.benchmarks.verification.mistakes import BY_KEY
 from conservative.benchmarks.verification.mistakes.bodies import FILES
 from conservative.benchmarks.verification.verify import verify
@@ -950,6 +950,23 @@ def test_mjcf_without_a_mass(tmp_path, arm_, geom, camera, verdicts):
     pytest.importorskip("mujoco")
     found = findings(tmp_path, {}, MASSLESS.format(arm=arm_, geom=geom, camera=camera), "m.xml")
     assert tuple(finding.verdict for finding in found.values()) == verdicts
+
+
+def test_engines_load_the_files_of_a_library_that_can_be_read(library, monkeypatch, read_in_this_process):
+    (library / "bad_description" / "urdf" / "bad.urdf").write_text("no model")
+    loaded = []
+
+    def load(files, *_):
+        loaded.extend(path.name for path in files)
+        finding = Finding("good.urdf", "bodies", "engine", Verdict.RIGHT)
+        return [Verification("good.urdf", "model file", (finding,)) for _ in files]
+
+    monkeypatch.setattr(models, "installed_loaders", lambda: {"engine"})
+    monkeypatch.setattr(models, "verify_files", load)
+    bad, good = verify(str(library))
+    assert loaded == ["good.urdf"]
+    assert (bad.verdict, good.verdict) == (Verdict.NOT_TESTED, Verdict.RIGHT)
+    assert {finding.check for finding in good.findings} == {"links", "bodies"}
 
 
 def test_engines_are_refused_without_the_check_that_uses_them(library):
