@@ -6,7 +6,7 @@ import os
 import re
 import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -99,47 +99,133 @@ def _words(text: str) -> list[str]:
 
 
 LAYERS = (".usd", ".usda", ".usdc", ".usdz")
-"""Suffixes of files that may be parts of other files, so that a library is not searched for them."""
+"""Suffixes of files that may be parts of other files, so that the folders below a library are not searched for them."""
+_WHOLE = {b"robot": b"<link", b"sdf": b"<link", b"mujoco": b"<body"}
+"""Root elements of models, and what a whole model has."""
 
 
-def models_below(folder: Path) -> Iterator[Path]:
-    """Yield the model files of XML in the folders below a folder, by name; other XML and parts of models are left out."""
-    for path in sorted(folder.rglob("*")):
-        if path.is_file() and path.suffix.lower() in set(MODELS) - set(LAYERS) and is_model(path):
-            yield path
+class Role(StrEnum):
+    """What a file of XML is in a library."""
+
+    MODEL = "model"
+    PART = "a part of a model or a template"
+    OTHER = "no model"
 
 
-def is_model(path: Path) -> bool:
-    """Return True if a file of XML is a whole model: a robot, a world or model of SDF, or MJCF with a body."""
+def role_of(path: Path) -> Role:
+    """Return what a file of XML is. One that is named as a model and is not XML is a model, which then cannot be read."""
     try:
         text = re.sub(rb"<!--.*?-->", b"", path.read_bytes(), flags=re.DOTALL)
     except OSError:
-        return False
+        text = b""
     root = re.search(rb"<(\w+)", text)
     name = root[1] if root else b""
-    whole = {b"robot": b"<link", b"sdf": b"<link", b"mujoco": b"<body"}
-    return name in whole and whole[name] in text and b"<xacro:" not in text
+    if name in _WHOLE:
+        return Role.MODEL if _WHOLE[name] in text and b"<xacro:" not in text else Role.PART
+    if name == b"mujocoinclude":
+        return Role.PART
+    return Role.OTHER if path.suffix.lower() == ".xml" else Role.MODEL
+
+
+@dataclass(frozen=True)
+class Folder:
+    """The recordings and model files of a folder and of the folders below it, and sentences on files that are left out."""
+
+    files: Sequence[Path]
+    notes: Sequence[str]
+
+
+def look_into(folder: Path) -> Folder:
+    """Return the files of a folder that are subjects: its recordings and models, and the models in the folders below it.
+
+    XML that is no model is left out, such as the package.xml of a ROS package; in folders below, parts of models and layers of
+    USD are, too. Files in folders whose name begins with a dot do not count.
+    """
+    own = sorted(path for path in folder.iterdir() if path.is_file() and path.name.lower().endswith((*ENDINGS, *MODELS)))
+    below = sorted(
+        path
+        for path in folder.rglob("*")
+        if path.parent != folder and path.suffix.lower() in MODELS and path.is_file() and not _is_hidden(path, folder)
+    )
+    roles = {path: role_of(path) for path in (*own, *below) if path.suffix.lower() in set(MODELS) - set(LAYERS)}
+    files = [path for path in own if roles.get(path) is not Role.OTHER]
+    files += [path for path in below if roles.get(path) is Role.MODEL]
+    left = {
+        "other files are not tested, because they are no models": [path for path in roles if roles[path] is Role.OTHER],
+        "other files are not tested, because they are parts or templates of models": [
+            path for path in below if roles.get(path) is Role.PART
+        ],
+        "USD files in folders below are not tested, because they may be layers of others": [p for p in below if p not in roles],
+    }
+    notes = [f"{reason}: {_names(paths, folder)}" for reason, paths in left.items() if paths]
+    return Folder(files, notes)
+
+
+def _is_hidden(path: Path, folder: Path) -> bool:
+    return any(part.startswith(".") for part in path.relative_to(folder).parts[:-1])
+
+
+def _names(paths: Sequence[Path], folder: Path) -> str:
+    names = [path.relative_to(folder).as_posix() for path in paths]
+    return ", ".join(names[:MOST_NAMES]) + (f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else "")
+
+
+MOST_NAMES = 20
+"""Largest number of names in a sentence."""
 
 
 def expand(texts: Sequence[str]) -> list[Subject]:
     """Return the subjects of texts. Raise `BadInput`.
 
-    A folder stands for its recordings and model files, by name. Without any, it is a library and stands for the model files in
-    the folders below it.
+    A folder stands for its recordings and model files, by name, and for the model files in the folders below it.
     """
     subjects = []
     for text in texts:
         if (folder := Path(text)).is_dir():
-            endings = (*ENDINGS, *MODELS)
-            files = sorted(path for path in folder.iterdir() if path.is_file() and path.name.lower().endswith(endings))
-            files = files or list(models_below(folder))
+            files = look_into(folder).files
             if not files:
-                raise BadInput("subject", f"the folder {text!r}", f"a folder with files that end in {', '.join(endings)}")
-            subjects += [Subject(str(path), kind_of(str(path)), path, in_folder=True) for path in files]
+                allowed = f"a folder with files that end in {', '.join((*ENDINGS, *MODELS))}"
+                raise BadInput("subject", f"the folder {text!r}", allowed)
+            kinds = [Kind.MODEL if path.suffix.lower() in MODELS else Kind.RECORDING for path in files]
+            subjects += [Subject(str(path), kind, path, in_folder=True) for path, kind in zip(files, kinds, strict=True)]
         else:
             kind = kind_of(text)
             subjects.append(Subject(text, kind, Path(text) if kind in (Kind.RECORDING, Kind.MODEL) else None))
     return subjects
+
+
+def _leave_out(subjects: Sequence[Subject], only: Sequence[str], body: object) -> tuple[list[Subject], list[str]]:
+    """Return the subjects without files of folders that no check uses, and sentences on these.
+
+    In a folder of models, files that the user did not name are left out: of a kind for which `only` has no check, and, without
+    a body, those that are no recordings, such as CMakeLists.txt.
+    """
+    if not any(subject.kind is Kind.MODEL for subject in subjects):
+        return list(subjects), []
+    kept, unchecked, others = list[Subject](), list[str](), list[str]()
+    for subject in subjects:
+        if not subject.in_folder or not subject.path:
+            kept.append(subject)
+        elif only and not set(only) & set(CHECKS_OF[subject.kind]):
+            unchecked.append(subject.path.name)
+        elif subject.kind is Kind.RECORDING and body is None and not _is_recording(subject.path):
+            others.append(subject.path.name)
+        else:
+            kept.append(subject)
+    left = {f"other files are not tested, because --only {','.join(only)} has no check for them": unchecked}
+    left["other files are not tested, because they are neither models nor recordings"] = others
+    notes = [f"{reason}: {', '.join(names[:MOST_NAMES])}" for reason, names in left.items() if names]
+    return kept, notes
+
+
+def _is_recording(path: Path) -> bool:
+    """Return True if a file has a table with the time and three rates at least."""
+    from .recordings.formats import open_table
+
+    try:
+        return len(open_table(path).names) >= 4
+    except BadInput:
+        return False
 
 
 def verify(
@@ -218,9 +304,12 @@ def verify(
     if rates is not None:
         choice("rates", rates, ("body", "world"))
         reading["world"] = rates == "world"
-    expanded = expand([os.fspath(subject) for subject in listed if isinstance(subject, str | os.PathLike)])
+    paths = [os.fspath(subject) for subject in listed if isinstance(subject, str | os.PathLike)]
+    expanded = expand(paths)
     for name in only:
         choice("only", name, tuple(CHECKS))
+    expanded, notes = _leave_out(expanded, only, body)
+    notes += [note for path in map(Path, paths) if path.is_dir() for note in look_into(path).notes]
     kinds = {subject.kind for subject in expanded} | ({Kind.METHOD} if methods else set())
     begin = None if start == "row" else start
     _refuse_unused(
@@ -235,7 +324,20 @@ def verify(
 
     with known_errors.comparing(record, known, only, bool(pairs)) as compare:
         folders = [*search, *_packages(listed)]
-        return compare(_verify_all(expanded, methods, body, engines, only, pairs, folders, start, error, seed, tell, reading))
+        verified = _verify_all(expanded, methods, body, engines, only, pairs, folders, start, error, seed, tell, reading)
+        return compare(_with_notes(verified, notes))
+
+
+def _is_folder(subject: Any) -> bool:
+    return isinstance(subject, str | os.PathLike) and Path(subject).is_dir()
+
+
+def _with_notes(verifications: Sequence[Verification], notes: Sequence[str]) -> list[Verification]:
+    """Return verifications, the first one of them with notes on files that are left out."""
+    if not verifications:
+        return []
+    first, *others = verifications
+    return [replace(first, notes=(*first.notes, *notes)) if notes else first, *others]
 
 
 def _verify_all(
@@ -274,7 +376,7 @@ def _verify_all(
 
 def _packages(subjects: Sequence[Any]) -> list[Path]:
     """Return the folders that are subjects, and the folders of ROS packages in them, for `package://`."""
-    folders = [Path(text) for text in subjects if isinstance(text, str | os.PathLike) and Path(text).is_dir()]
+    folders = [Path(text) for text in subjects if _is_folder(text)]
     inside = [file.parent.parent for folder in folders for file in sorted(folder.rglob("package.xml")) if file.parent != folder]
     return list(dict.fromkeys([*folders, *inside]))
 

@@ -6,10 +6,11 @@ inertia as they are written in the file. Its shapes, visual and collision, are p
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -22,11 +23,11 @@ from ..engine import load
 from ..worker.calls import python_worker, run_within
 from ..worker.client import EngineCrashed, EngineTimeout
 from .collada import read_collada
-from .description import Description, is_true, numbers
+from .description import Description, Joint, is_true, numbers
 from .files import Unread, find, guard_layers, inline, kind_of, load_mesh, parse, read_bytes, reason, refuse
-from .pieces import DENSITY, Link, Reading, make_pose, rounding_of
+from .pieces import Link, Reading, make_pose, rounding_of
 from .readers import MEMORY, SECONDS
-from .usd import Stage
+from .usd import Stage, link_of
 
 ROUND = 24
 """Number of points around a round shape."""
@@ -56,6 +57,10 @@ class RobotLink:
         Visual and collision shapes that could be read.
     unread
         Reasons why shapes could not be read.
+    unknown
+        Reason why mass and inertia are not known, such as a missing mesh from which they follow; "" if they are.
+    assumed
+        True if mass and inertia are the default of the format, because the file has none: 1 kg and 1 kg m^2 in SDF.
     """
 
     link: Link
@@ -64,6 +69,8 @@ class RobotLink:
     written: bool = True
     shapes: Sequence[Shape] = ()
     unread: Sequence[str] = ()
+    unknown: str = ""
+    assumed: bool = False
 
     @property
     def name(self) -> str:
@@ -75,13 +82,15 @@ class RobotLink:
 class Robot:
     """A model of a file: its links, parents before children, and notes on what was not read.
 
-    `name` is the name of the model if the file has several, and "" otherwise.
+    `name` is the name of the model if the file has several, and "" otherwise. `broken` has sentences on rules of the format
+    that the file breaks, so that parsers refuse it.
     """
 
     kind: str
     name: str = ""
     links: list[RobotLink] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    broken: list[str] = field(default_factory=list)
 
 
 def read_robots(
@@ -140,20 +149,91 @@ def read_robots_here(path: Path, search: Sequence[Path] = ()) -> list[Robot]:
 
 def _read_xml(path: Path, kind: str, search: Sequence[Path]) -> list[Robot]:
     root = parse(path)
-    models = [root] if root.tag == "robot" else [*root.iter("model")]
+    models = [root] if root.tag == "robot" else [model for model in root.iter("model") if model.getparent().tag != "model"]
     robots = []
     for model in models:
-        robot, reading = Robot(kind, model.get("name", "") if len(models) > 1 else ""), Reading()
-        frames = Description(path, model, search, reading)
-        joints: dict[str, Any] = {}
-        for joint in frames.joints:
-            joints.setdefault(joint.child, joint)  # the others close loops
-        names = [link.get("name", "") for link in model.findall("link")]
-        for name in _from_root(path, names, {child: joint.parent for child, joint in joints.items()}):
-            robot.links.append(_xml_link(path, frames, name, joints.get(name), robot.links, search))
-        robot.notes = list(dict.fromkeys([*reading.invalid, *reading.doubts]))
+        robot = Robot(kind, model.get("name", "") if len(models) > 1 else "")
+        _add_model(path, model, robot, search)
+        by_name = {link.name: link for link in robot.links}
+        parents = {link.name: link.parent for link in robot.links}
+        robot.links = [by_name[name] for name in _from_root(path, list(by_name), parents)]
+        robot.notes = list(dict.fromkeys(robot.notes))
         robots.append(robot)
     return robots
+
+
+def _add_model(
+    path: Path,
+    model: Any,
+    robot: Robot,
+    search: Sequence[Path],
+    prefix: str = "",
+    base: Array | None = None,
+    outer: Mapping[str, Joint] = MappingProxyType({}),
+) -> None:
+    """Add the links of a model, and of the models in it with the names `model::link`, to a robot.
+
+    `prefix` and `base` (4, 4) are the name and the pose of a model within another one, and `outer` has the joints of the outer
+    models by the names of their children.
+    """
+    reading = Reading()
+    doubled = _name_apart(model)
+    frames = Description(path, model, search, reading)
+    names = [link.get("name", "") for link in model.findall("link")]
+    robot.broken += doubled if frames.urdf else []
+    reading.invalid += [] if frames.urdf else doubled
+    if frames.urdf:
+        robot.broken += _broken_joints(frames, names)
+    joints: dict[str, Joint] = {}
+    for joint in frames.joints:
+        joints.setdefault(joint.child, joint)  # the others close loops
+    for name in _from_root(path, names, {child: joint.parent for child, joint in joints.items()}):
+        link = _xml_link(path, frames, name, joints.get(name), robot.links, search)
+        if not frames.urdf:
+            above = outer.get(prefix + name)
+            own = link.link if base is None else replace(link.link, pose=base @ link.link.pose)
+            parent = above.parent if above else link.parent and prefix + link.parent
+            kind = above.kind if above else link.joint
+            link = replace(link, link=replace(own, name=prefix + name), parent=parent, joint=kind)
+        robot.links.append(link)
+    robot.notes += [*reading.invalid, *reading.doubts]
+    all_joints = {**outer, **{prefix + child: joint._replace(parent=prefix + joint.parent) for child, joint in joints.items()}}
+    for inner in model.findall("model"):
+        element = inner.find("pose")
+        place = frames.place("" if element is None else element.get("relative_to", "")) @ frames.pose(element)
+        place = place if base is None else base @ place
+        _add_model(path, inner, robot, search, f"{prefix}{inner.get('name', '')}::", place, all_joints)
+
+
+def _broken_joints(frames: Description, names: Sequence[str]) -> list[str]:
+    """Return sentences on joints of URDF that parsers refuse: to links that are not there, and a second one to a child."""
+    sentences, children = list[str](), set[str]()
+    for joint in frames.joints:
+        sentences += [
+            f"the joint {joint.name!r} is to the link {end!r}, which is not there"
+            for end in (joint.parent, joint.child) if end not in names
+        ]  # fmt: skip
+        if joint.child in children:
+            sentences.append(f"the joint {joint.name!r} is the second one to the child {joint.child!r}")
+        children.add(joint.child)
+    return sentences
+
+
+def _name_apart(model: Any) -> list[str]:
+    """Give links that have the name of an earlier one another name. Return sentences on them."""
+    names = [link.get("name", "") for link in model.findall("link")]
+    taken, sentences = set[str](), list[str]()
+    for link in model.findall("link"):
+        old = name = link.get("name", "")
+        while name in taken:
+            name += " (again)"
+        if name != old:
+            sentences.append(
+                f"{names.count(old)} links have the name {old!r}; joints to it are read as joints to the first one"
+            )
+            link.set("name", name)
+        taken.add(name)
+    return list(dict.fromkeys(sentences))
 
 
 def _from_root(path: Path, names: Sequence[str], parents: dict[str, str]) -> list[str]:
@@ -193,8 +273,10 @@ def _xml_link(
         pose = np.eye(4) if joint is None else parents.get(joint.parent, np.eye(4)) @ joint.pose
     link = Link(pose, link.mass, link.frame, link.inertia, name=name, rounding=link.rounding)
     parent, kind = ("", "") if joint is None else (joint.parent, joint.kind)
-    written = inertial is not None and len(inertial) > 0 and not auto
-    return RobotLink(link, parent, kind, written, shapes, list(dict.fromkeys(unread)))
+    static = any(is_true(model.findtext("static")) for model in element.iterancestors("model"))
+    assumed = not frames.urdf and not static and not auto and (inertial is None or not len(inertial))
+    written = assumed or (inertial is not None and len(inertial) > 0 and not auto)
+    return RobotLink(link, parent, kind, written, shapes, list(dict.fromkeys(unread)), assumed=assumed)
 
 
 def _xml_points(path: Path, form: Any, place: Array, search: Sequence[Path]) -> Array:
@@ -252,21 +334,26 @@ def _read_mjcf(path: Path, search: Sequence[Path]) -> Robot:
     """Return the bodies of an MJCF file. MuJoCo compiles a copy in which masses and inertias that it refuses are replaced."""
     mujoco, spec = _parse_mjcf(path, search)
     options, off = spec.compiler, {"balanceinertia": 0, "boundmass": 0, "boundinertia": 0, "settotalmass": -1, "fusestatic": 0}
+    changed = [name for name, value in off.items() if name != "fusestatic" and getattr(options, name) not in (0, value)]
     from_geometry = int(options.inertiafromgeom) == int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE)
     for name, value in off.items():
         setattr(options, name, value)
+    bodies = [body for body in spec.bodies if body != spec.worldbody]
+    _name_all(bodies)
+    groups = [int(group) for group in options.inertiagrouprange]
+    weighing = {geom.parent.name for geom in spec.geoms if _weighs(mujoco, geom, groups) and geom.meshname}
     unread = _drop_missing_meshes(spec, path, search)
     written: dict[int, tuple[float, Array, bool]] = {}
-    bodies = [body for body in spec.bodies if body != spec.worldbody]
+    empty: dict[int, str] = {}
     for number, body in enumerate(bodies):
         if body.explicitinertial and not from_geometry:
-            full = np.array(body.fullinertia)
-            tensor = np.diag(np.array(body.inertia))
-            if is_full := bool(np.isfinite(full[0])):
-                tensor = np.array([[full[0], full[3], full[4]], [full[3], full[1], full[5]], [full[4], full[5], full[2]]])
-            written[number] = float(body.mass), tensor, is_full
-        elif list(body.geoms) and any(geom.mass != 0 for geom in body.geoms) and body.name not in unread:
+            written[number] = _mjcf_inertial(body)
+        elif body.name in unread and body.name in weighing:
+            empty[number] = f"its mass and inertia follow from its shapes: {unread[body.name][0]}"
+        elif any(_weighs(mujoco, geom, groups) for geom in body.geoms):
             continue
+        else:
+            empty[number] = ""
         body.explicitinertial, body.mass, body.inertia = 1, 1.0, np.ones(3)
         body.fullinertia = np.full(6, np.nan)
     try:
@@ -274,7 +361,10 @@ def _read_mjcf(path: Path, search: Sequence[Path]) -> Robot:
     except (ValueError, mujoco.FatalError) as error:
         raise _refused(path, error, "compiles") from None
     mujoco.mj_kinematics(model, data := mujoco.MjData(model))
-    robot, names = Robot("mjcf"), [""] + [body.name or f"body {number}" for number, body in enumerate(bodies)]
+    robot, ids = Robot("mjcf"), [body.id for body in bodies]
+    if changed:
+        names = ", ".join(changed)
+        robot.notes.append(f"MuJoCo changes masses or inertias by {names}, and what it makes of them is not tested")
     for number, body in enumerate(bodies):
         k = body.id
         R = _matrix(mujoco, model.body_iquat[k])
@@ -282,17 +372,44 @@ def _read_mjcf(path: Path, search: Sequence[Path]) -> Robot:
         if number in written:
             mass, tensor, is_full = written[number]
             frame = make_pose(model.body_ipos[k], None if is_full else R)
-        elif list(body.geoms):
-            mass, tensor, frame = float(model.body_mass[k]), np.diag(model.body_inertia[k]), make_pose(model.body_ipos[k], R)
-        else:
+        elif number in empty:
             mass, tensor, frame = 0.0, np.zeros((3, 3)), np.eye(4)
-        link = Link(pose, mass, frame, tensor, name=names[number + 1], rounding=rounding_of(tensor.ravel().tolist()))
+        else:
+            mass, tensor, frame = float(model.body_mass[k]), np.diag(model.body_inertia[k]), make_pose(model.body_ipos[k], R)
+        link = Link(pose, mass, frame, tensor, name=body.name, rounding=rounding_of(tensor.ravel().tolist()))
         kinds = [mujoco.mjtJoint(joint.type).name.removeprefix("mjJNT_").lower() for joint in body.joints]
-        parent = names[[other.id for other in bodies].index(body.parent.id) + 1] if body.parent.id else ""
+        parent = bodies[ids.index(body.parent.id)].name if body.parent.id else ""
         joint = " ".join(kinds) or ("fixed" if parent else "")
-        missing = unread.get(body.name, [])
-        robot.links.append(RobotLink(link, parent, joint, number in written, _mjcf_shapes(mujoco, model, k), missing))
+        shapes, missing = _mjcf_shapes(mujoco, model, k), unread.get(body.name, [])
+        robot.links.append(RobotLink(link, parent, joint, number in written, shapes, missing, empty.get(number, "")))
     return robot
+
+
+def _mjcf_inertial(body: Any) -> tuple[float, Array, bool]:
+    """Return mass and inertia (3, 3) of an <inertial>, and whether it has all six numbers, in the axes of the body."""
+    full = np.array(body.fullinertia)
+    if not np.isfinite(full[0]):
+        return float(body.mass), np.diag(np.array(body.inertia)), False
+    return float(body.mass), full[np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])], True
+
+
+def _name_all(bodies: Sequence[Any]) -> None:
+    """Give bodies without a name one that no other body has."""
+    taken = {body.name for body in bodies}
+    for number, body in enumerate(bodies):
+        if not body.name:
+            name = f"body {number}"
+            while name in taken:
+                name += " (unnamed)"
+            body.name = name
+            taken.add(name)
+
+
+def _weighs(mujoco: Any, geom: Any, groups: Sequence[int]) -> bool:
+    """Return True if a geometry adds to the mass of its body."""
+    if geom.type == mujoco.mjtGeom.mjGEOM_PLANE or not groups[0] <= int(geom.group) <= groups[1]:
+        return False
+    return bool(geom.mass > 0 or (np.isnan(geom.mass) and geom.density > 0))
 
 
 def _parse_mjcf(path: Path, search: Sequence[Path]) -> tuple[Any, Any]:
@@ -383,25 +500,41 @@ def _read_usd(path: Path, search: Sequence[Path]) -> Robot:
             parents[ends[1][0]] = ends[0][0], kind
     robot = Robot("usd")
     for name in _from_root(path, list(names), {child: parent for child, (parent, _) in parents.items()}):
-        body, (pose, scale) = names[name], stage.pose(names[name])
+        body = names[name]
         shapes, unread = _usd_shapes(stage, body)
-        mass, _, com, inertia = stage.authored(body)
-        written = bool(mass and mass > 0 and inertia is not None)
-        if written:
-            frame = make_pose(np.zeros(3) if com is None else scale @ com)
-            moments = body.GetAttribute("physics:diagonalInertia").Get()
-            rounding = rounding_of(map(np.float32, moments)) * stage.kilogram * stage.metre**2
-            link = Link(pose, float(mass or 0), frame, np.array(inertia), name=name, rounding=rounding)
-        else:
-            points = np.vstack([shape.points for shape in shapes]) if shapes else np.zeros((0, 3))
-            extent = np.ptp(points, axis=0) if len(points) else np.zeros(3)
-            weight = float(mass) if mass and mass > 0 else DENSITY * float(np.prod(extent))
-            middle = (points.min(axis=0) + points.max(axis=0)) / 2 if len(points) else np.zeros(3)
-            moments = weight / 12 * (extent @ extent - extent**2)
-            link = Link(pose, weight, make_pose(middle), np.diag(moments), name=name)
+        link, written, unknown = _usd_link(stage, body)
         parent, kind = parents.get(name, ("", ""))
-        robot.links.append(RobotLink(link, parent, kind, written, shapes, unread))
+        robot.links.append(RobotLink(link, parent, kind, written, shapes, unread, unknown))
     return robot
+
+
+def _usd_link(stage: Stage, body: Any) -> tuple[Link, bool, str]:
+    """Return mass and inertia of a body, whether the file has a part of them, and why they are not known.
+
+    What the file does not have follows from the colliders by the rules of `ComputeMassProperties`. Their volumes have to be
+    known.
+    """
+    pose, scale = stage.pose(body)
+    empty, (mass, _, com, inertia) = Link(pose, name=str(body.GetPath())), stage.authored(body)
+    colliders = stage.colliders(body)
+    if mass and mass > 0 and inertia is not None:
+        moments = body.GetAttribute("physics:diagonalInertia").Get()
+        rounding = rounding_of(map(np.float32, moments)) * stage.kilogram * stage.metre**2
+        frame = make_pose(np.zeros(3) if com is None else scale @ com)
+        return replace(empty, mass=float(mass), frame=frame, inertia=np.array(inertia), rounding=rounding), True, ""
+    if not colliders:
+        parts = [name for name, value in (("mass", mass), ("inertia", inertia)) if value is not None]
+        return empty, False, f"it has {' and '.join(parts) or 'neither mass nor inertia'}, and no collider for the others"
+    reading = Reading()
+    try:
+        link = link_of(stage, body, reading)
+    except (BadInput, ValueError, TypeError, IndexError, ArithmeticError) as error:
+        text = reason(error) if isinstance(error, BadInput) else str(error)
+        return empty, False, f"its mass and inertia follow from its colliders: {text}"
+    if reading.doubts:
+        return empty, False, f"its mass and inertia follow from its colliders: {reading.doubts[0]}"
+    values = [value for prim in (body, *colliders) for value in stage.authored(prim)]
+    return link, any(value is not None for value in values), ""
 
 
 def _usd_shapes(stage: Stage, body: Any) -> tuple[list[Shape], list[str]]:

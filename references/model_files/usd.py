@@ -264,10 +264,11 @@ def read_usd(path: Path, search: Sequence[Path], reading: Reading) -> list[Link]
     if not bodies or len(joints) != len(bodies) - 1 or not all(joint.IsA(stage.physics.FixedJoint) for joint in joints):
         raise refuse(path, f"{len(bodies)} rigid bodies and the joints {[joint.GetName() for joint in joints]}", ONE)
     reading.doubts.extend(filter(None, map(stage.apart, joints)))
-    return [_link(stage, body, reading) for body in bodies]
+    return [link_of(stage, body, reading) for body in bodies]
 
 
-def _link(stage: Stage, body: Any, reading: Reading) -> Link:
+def link_of(stage: Stage, body: Any, reading: Reading) -> Link:
+    """Return mass and inertia of a body by its attributes and its colliders. Raise `BadInput` for an unknown volume."""
     forms, (pose, scale), colliders = [], stage.pose(body), stage.colliders(body)
     for attribute in [authored for prim in dict.fromkeys([body, *colliders]) for authored in prim.GetAuthoredAttributes()]:
         space, colon, name = attribute.GetName().partition(":")

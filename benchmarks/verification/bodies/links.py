@@ -7,6 +7,7 @@ example-robot-data 6.0.0, with 1,743 links that have a mass.
 from __future__ import annotations
 
 import math
+import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -25,7 +26,7 @@ from conservative.references.model_files.robot_links import Robot, RobotLink, re
 from ..finding import Cause, Finding, Verdict, Verification
 from ..mistakes.bodies import FILES, LOADED
 from ..mistakes.mistake import Mistake
-from .solids import DENSEST, Hull, density_of, hull_of, ratio, reach, unlike
+from .solids import DENSEST, Hull, density_of, hull_of, overhang, ratio, reach, spread_density, unlike
 from .twins import Pair, find_pairs, part_of
 
 NOTHING = 0.05
@@ -54,6 +55,15 @@ TURNED = 0.1
 """Relative difference of the inertias of twins with the same moments that shows a wrong sign of a product."""
 MATERIALS = "materials"
 """The reason for a largest density."""
+SOLID = 12000.0
+"""Density of the hull of its shapes, kg/m^3, from which on the shapes of a body may be symbols."""
+MILLIMETRE = 1e-3
+NO_DIGITS = 1e-200
+"""Rounding, kg m^2, below which an inertia has no digits, because it follows from shapes."""
+SPARSEST = 10.0
+"""`spread_density`, kg/m^3, below which small shapes that may be symbols do not explain a large inertia."""
+LARGEST = 1e60
+"""Largest mass, inertia and distance in SI units that products of several of them leave finite; the smallest is its inverse."""
 GRAVITY = 9.81
 """Acceleration of gravity, m/s^2."""
 
@@ -122,9 +132,13 @@ def verify_links(
     read = read_robots(paths, search, tell)
     if len(read) == 1 and isinstance(read[0], Exception):
         raise read[0]
-    unique = len({path.name for path in paths}) == len(paths)
-    names = [path.name if unique else str(path) for path in paths]
-    return [_verify(name, robots) for name, robots in zip(names, read, strict=True)]
+    return [_verify(name, robots) for name, robots in zip(short_names(paths), read, strict=True)]
+
+
+def short_names(paths: Sequence[Path]) -> list[str]:
+    """Return the paths of files relative to the folder that has all of them."""
+    folder = Path(os.path.commonpath([path.absolute().parent for path in paths])) if paths else Path()
+    return [path.absolute().relative_to(folder).as_posix() for path in paths]
 
 
 def _verify(name: str, robots: Sequence[Robot] | Exception) -> Verification:
@@ -132,7 +146,7 @@ def _verify(name: str, robots: Sequence[Robot] | Exception) -> Verification:
         text = f"the file has {reason(robots)}" if isinstance(robots, BadInput) else str(robots)
         finding = LinkFinding(name, "links", "", Verdict.NOT_TESTED, detail=text)
         return Verification(name, "model file", (finding,), "it cannot be read")
-    findings = [finding for robot in robots for finding in judge(robot, name)]
+    findings = [finding for robot in robots for finding in _judge_safely(robot, name)]
     notes = [note for robot in robots for note in _notes(robot)]
     return Verification(name, "model file", tuple(findings), _summary(findings), tuple(dict.fromkeys(notes)))
 
@@ -145,6 +159,23 @@ def _notes(robot: Robot) -> Iterator[str]:
         first = next(iter(unread))
         unread_links = f"{count} of {len(robot.links)} links have shapes that are not read, so that less is tested"
         yield f"{unread_links}: {first} (--search FOLDER)"
+    for link in robot.links:
+        if _is_in_millimetres(link):
+            yield f"the shapes of {link.name!r} are 1,000 times as large as its inertia shows: is a mesh in mm?"
+
+
+def _is_in_millimetres(link: RobotLink) -> bool:
+    """Return True if a link has the inertia of its shapes at a thousandth of their size."""
+    if (
+        not link.shapes
+        or not link.link.mass > 0
+        or np.ptp(np.vstack([shape.points for shape in link.shapes]), axis=0).max() < 1
+    ):
+        return False
+    part = part_of(link)
+    return bool(np.isfinite(part.inertia).all()) and any(
+        _is_like(part.inertia * MILLIMETRE**-2, hull, part.mass) for hull in _hulls(link)
+    )
 
 
 def _summary(findings: Sequence[Finding]) -> str:
@@ -152,7 +183,8 @@ def _summary(findings: Sequence[Finding]) -> str:
     wrong = Counter(finding.mistake for finding in findings if finding.verdict is Verdict.WRONG)
     text = f"{counts[Verdict.WRONG]} of {len(findings)} links are wrong"
     text += f" ({', '.join(f'{key}: {count}' for key, count in wrong.most_common())})" if wrong else ""
-    return text + (f", {counts[Verdict.UNDECIDED]} undecided" if counts[Verdict.UNDECIDED] else "")
+    others = [f", {counts[verdict]} {verdict}" for verdict in (Verdict.UNDECIDED, Verdict.NOT_TESTED) if counts[verdict]]
+    return text + "".join(others)
 
 
 # -------------------------------------------------------------------------------------------------------- bodies of a robot
@@ -201,26 +233,65 @@ def find_bodies(links: Sequence[RobotLink]) -> dict[str, Body]:
 # --------------------------------------------------------------------------------------------------------------- the verdict
 
 
+def _judge_safely(robot: Robot, subject: str) -> list[LinkFinding]:
+    """Return the findings of `judge`, or one that says which numbers cannot be computed with. A library goes on after it."""
+    try:
+        with np.errstate(all="ignore"):
+            return judge(robot, subject)
+    except (ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
+        text = f"its numbers cannot be computed with ({type(error).__name__})"
+        return [LinkFinding(subject, "links", robot.name, Verdict.NOT_TESTED, detail=text)]
+
+
+def _unusable(link: RobotLink) -> str:
+    """Return why the numbers of a link cannot be computed with, or are not known; "" if they can."""
+    own = link.link
+    if not (np.isfinite(own.mass) and np.isfinite(own.inertia).all() and np.isfinite(own.frame).all()):
+        return "its mass, centre of mass or inertia is not finite"
+    sizes = np.abs([own.mass, *own.inertia.ravel(), *own.frame[:3, 3]])
+    if sizes.max() > LARGEST or (0 < sizes[0] < 1 / LARGEST) or (own.inertia.any() and np.abs(own.inertia).max() < 1 / LARGEST):
+        return f"its mass, centre of mass or inertia is beyond {LARGEST:.0e} or below {1 / LARGEST:.0e}"
+    return link.unknown
+
+
 def judge(robot: Robot, subject: str) -> list[LinkFinding]:
-    """Return a finding for each link of a robot."""
-    bodies, pairs = find_bodies(robot.links), find_pairs(robot.links)
+    """Return a finding for each link of a robot. Links are told apart by their names, which differ."""
+    unusable = {link.name: text for link in robot.links if (text := _unusable(link))}
+    links = [_emptied(link, unusable[link.name]) if link.name in unusable else link for link in robot.links]
+    bodies, pairs = find_bodies(links), find_pairs(links)
     twin_of = {link.name: (pair, link is pair.right) for pair in pairs for link in (pair.left, pair.right)}
-    faults = {link.name: list(_faults(link, bodies[link.name], twin_of.get(link.name))) for link in robot.links}
+    faults = {link.name: list(_faults(link, bodies[link.name], twin_of.get(link.name))) for link in links}
     for pair in pairs:
         _compare_twins(pair, faults, bodies)
-    return [_finding(link, bodies[link.name], faults[link.name], subject, robot.name) for link in robot.links]
+    broken = [
+        LinkFinding(
+            subject, "links", robot.name, Verdict.WRONG, detail=text, effect="engines that check it refuse the file"
+        )
+        for text in robot.broken
+    ]  # fmt: skip
+    return broken + [_finding(link, bodies[link.name], faults[link.name], subject, robot.name) for link in links]
+
+
+def _emptied(link: RobotLink, text: str) -> RobotLink:
+    """Return a link whose mass is not known; its shapes stay."""
+    empty = replace(link.link, mass=0.0, inertia=np.zeros((3, 3)), frame=np.eye(4))
+    return replace(link, link=empty, written=False, unknown=text)
 
 
 def _finding(link: RobotLink, body: Body, faults: Sequence[Fault], subject: str, model: str) -> LinkFinding:
     name = f"{model}: {link.name}" if model else link.name
     moments = tuple(np.linalg.eigvalsh(link.link.inertia).tolist())
     right = LinkFinding(subject, "links", name, Verdict.RIGHT, mass=link.link.mass, moments=moments)
+    if link.unknown:
+        return replace(right, verdict=Verdict.NOT_TESTED, mass=math.nan, moments=(), detail=link.unknown)
     if not faults:
         return right if link.written else replace(right, detail="it has no inertia of its own")
     matter = [fault for fault in faults if not _harmless(link, body, fault)]
     if not matter:
         text = f"{faults[0].text}, which does not change the motion of {body.root.name!r}, to which it is fixed"
         return replace(right, detail=text)
+    if unknown := [member.name for member in body.members if member.unknown]:
+        matter = [_unless_the_rest_decides(fault, part_of(link), unknown[0]) for fault in matter]
     wrong = [fault for fault in matter if fault.verdict is Verdict.WRONG] or matter
     main = wrong[0]
     effects = [fault.effect or _effect(link, body, fault) for fault in wrong]
@@ -240,6 +311,13 @@ def _finding(link: RobotLink, body: Body, faults: Sequence[Fault], subject: str,
         effect="; ".join(dict.fromkeys(filter(None, effects))),
         repair=repair,
     )
+
+
+def _unless_the_rest_decides(fault: Fault, part: Piece, name: str) -> Fault:
+    """Return a fault as undecided if the mass of a link that is fixed to it is not known, and may make it harmless."""
+    if part.flaw:
+        return fault
+    return replace(fault, verdict=Verdict.UNDECIDED, text=f"{fault.text}; it is fixed to {name!r}, whose mass is not known")
 
 
 def _harmless(link: RobotLink, body: Body, fault: Fault) -> bool:
@@ -279,6 +357,8 @@ def _motion(link: RobotLink, body: Body, fault: Fault) -> str:
     whole = body.whole()
     if fault.key == "no inertial element":
         return "it has no mass: an engine refuses it, or it accelerates without limit"
+    if not whole.mass > 0:
+        return "a force accelerates it the other way" if whole.mass < 0 else "it accelerates without limit under a force"
     moments = np.linalg.eigvalsh(whole.inertia) if whole.mass else np.zeros(3)
     if moments[0] < 0 and moments[0] < -1e-9 * moments[2]:
         return "a torque about one axis turns it the other way, and its energy has no lower bound"
@@ -337,8 +417,10 @@ def _length(metres: float) -> str:
 
 
 def _angle(inertia: Array, other: Array) -> float:
-    """Return the angle between the axes of the largest moments of two inertias, degrees."""
-    axes = [np.linalg.eigh(tensor)[1][:, 2] for tensor in (inertia, other)]
+    """Return the angle between the axes of the moments of two inertias that differ most from the others, degrees."""
+    moments = np.linalg.eigvalsh(other)
+    alone = 0 if moments[1] - moments[0] > moments[2] - moments[1] else 2  # equal moments have no axes of their own
+    axes = [np.linalg.eigh(tensor)[1][:, alone] for tensor in (inertia, other)]
     return math.degrees(math.acos(min(1.0, abs(float(axes[0] @ axes[1])))))
 
 
@@ -356,24 +438,36 @@ def _faults(link: RobotLink, body: Body, twin: tuple[Pair, bool] | None) -> Iter
         return
     own = _hulls(link)
     solid = _solid(part, own)
-    mirrored = twin[0].mirrored(twin[1]) if twin else None
+    if link.assumed and link is body.root and link.joint and link.joint != "fixed":
+        default = f"{part.mass:g} kg, {part.inertia[0, 0]:g} kg m^2"
+        text = f"the file has no mass and inertia of it, so that the default holds: {default}"
+        yield Fault("placeholder inertia", text, math.nan, math.nan, "", "", solid or _ball(part))
+        return
+    sign = _sign(link, part, own) if part.mass > 0 else None
+    if sign is not None and sign.expected is not None and not _is_right(link, sign.expected, own, body):
+        sign = None
     if part.flaw:
-        sign = _sign(link, part, own) if part.mass > 0 else None
-        possible = sign is not None and sign.expected is not None and not sign.expected.flaw
-        yield sign if sign and possible else _impossible(link, part, own, mirrored, twin)
+        yield sign or _impossible(link, part, own, body, twin)
         if not part.mass > 0 or not part.inertia.any():
             return
-    else:
-        if (fault := _size(link, part, own, body, solid)) or (fault := _sign(link, part, own)):
-            yield fault
+    elif fault := sign or _size(link, part, own, body, solid, twin):
+        yield fault
     if fault := _centre(link, part, body):
         yield _unless_symbols(fault, body)
+
+
+def _is_right(link: RobotLink, part: Piece, hulls: Sequence[Hull], body: Body) -> bool:
+    """Return True if a link would be right with another part, by the rules on its inertia: a repair has to be."""
+    if part.flaw or _sign(link, part, hulls) is not None:
+        return False
+    size = _measure(part, hulls, body, link)
+    return not (size.small or size.large or size.slipped or size.far > FARTHEST[0])
 
 
 def _unless_symbols(fault: Fault, body: Body) -> Fault:
     """Return a fault as undecided if the shapes cannot hold the mass of the body: small spheres may be symbols."""
     mass = sum(link.link.mass for link in body.members)
-    if body.hull is None or mass < DENSEST * body.hull.volume:
+    if body.hull is None or mass < SOLID * body.hull.volume:
         return fault
     text = f"{fault.text}; but the shapes, whose hull would have {_rounded(mass / body.hull.volume)} kg/m^3, may be symbols"
     return replace(fault, verdict=Verdict.UNDECIDED, text=text)
@@ -399,38 +493,41 @@ def _missing(link: RobotLink, body: Body) -> Iterator[Fault]:
     """Yield a fault if a joint moves a body that has shapes and no mass."""
     if link is not body.root or not link.joint or link.joint == "fixed":
         return
-    if any(member.link.mass for member in body.members) or not any(member.shapes for member in body.members):
+    if any(member.link.mass or member.unknown for member in body.members):
+        return
+    if not any(member.shapes or member.unread for member in body.members):
         return
     text = f"the joint to it is {link.joint}, it has shapes, and neither it nor what is fixed to it has a mass"
     yield Fault("no inertial element", text, math.nan, math.nan, "", "")
 
 
-def _impossible(
-    link: RobotLink, part: Piece, hulls: Sequence[Hull], mirrored: Piece | None, twin: tuple[Pair, bool] | None
-) -> Fault:
-    """Return the fault of an inertia that no body has."""
-    moments = np.linalg.eigvalsh(part.inertia)
-    solid = _solid(part, hulls)
+def _impossible(link: RobotLink, part: Piece, hulls: Sequence[Hull], body: Body, twin: tuple[Pair, bool] | None) -> Fault:
+    """Return the fault of an inertia that no body has. It is undecided if the digits of the file leave it open."""
+    moments, solid = np.linalg.eigvalsh(part.inertia), _solid(part, hulls)
     if part.mass > 0 and not part.inertia.any():
         text = f"a mass of {part.mass:.4g} kg without inertia"
         return Fault("no inertia", text, math.nan, math.nan, "", "what a body can have", solid)
     error = float((moments[2] - moments[0] - moments[1] if part.excess else -moments[0]) / (np.abs(moments).max() or 1.0))
-    text = f"{part.flaw}: {list_numbers(moments)} kg m^2"
-    slips = list(_single_slips(link, part, hulls))
-    if mirrored is not None and not mirrored.flaw and twin:
-        slips = [slip for slip in slips if _close(slip[2], mirrored.inertia)] or slips
+    text = f"{part.flaw}: {list_numbers(moments)} kg m^2" if part.mass > 0 else f"{part.flaw}: {part.mass:.4g} kg"
+    fault = Fault("impossible inertia", text, error, 0.0, "relative", "what a body can have", solid)
+    if part.mass > 0 and moments[0] > 0 and part.excess < part.rounding * (1 + 1e-9):
+        text, effect = f"{text}, by less than the rounding of its digits", "engines that check it refuse the file"
+        return replace(fault, verdict=Verdict.UNDECIDED, text=text, effect=effect)
+    if not part.mass > 0:
+        return fault
+    mirrored = twin[0].mirrored(twin[1]) if twin else None
+    mirrored = mirrored if mirrored and _is_right(link, mirrored, hulls, body) else None
+    slips = list(_single_slips(link, part, hulls, body, mirrored))
     if len(slips) == 1:
         name, power, inertia = slips[0]
-        repair = f"multiply {name} by 10^{power}"
-        return Fault(
-            "decimal slip", text, error, 0.0, "relative", "what a body can have", replace(part, inertia=inertia), repair,
+        return replace(
+            fault, key="decimal slip", expected=replace(part, inertia=inertia), repair=f"multiply {name} by 10^{power}",
             numbers={"power": float(power)},
         )  # fmt: skip
-    expected, repair = solid, ""
-    if mirrored is not None and not mirrored.flaw and twin:
+    if mirrored is not None and twin:
         other = twin[0].left if twin[1] else twin[0].right
-        expected, repair = mirrored, f"the mirrored values of {other.name!r}"
-    return Fault("impossible inertia", text, error, 0.0, "relative", "what a body can have", expected, repair)
+        return replace(fault, expected=mirrored, repair=f"the mirrored values of {other.name!r}")
+    return fault
 
 
 def _close(inertia: Array, other: Array) -> bool:
@@ -440,79 +537,176 @@ def _close(inertia: Array, other: Array) -> bool:
 _NUMBERS = (("ixx", 0, 0), ("iyy", 1, 1), ("izz", 2, 2), ("ixy", 0, 1), ("ixz", 0, 2), ("iyz", 1, 2))
 
 
-def _single_slips(link: RobotLink, part: Piece, hulls: Sequence[Hull]) -> Iterator[tuple[str, int, Array]]:
-    """Yield the numbers of an inertia that a power of ten turns into one with the proportions of the hull, or of any body."""
+def _single_slips(
+    link: RobotLink, part: Piece, hulls: Sequence[Hull], body: Body, mirrored: Piece | None
+) -> Iterator[tuple[str, int, Array]]:
+    """Yield the numbers of an inertia that a power of ten turns into one that the shapes and the twin have.
+
+    Without shapes and without a twin nothing shows which number is wrong.
+    """
+    if not hulls and mirrored is None:
+        return
     turn = link.link.frame[:3, :3]
-    for (name, i, j), power in product(_NUMBERS, (-3, -2, -1, 1, 2, 3)):
+    for (name, i, j), power in product(_NUMBERS, (*range(-POWERS, 0), *range(1, POWERS + 1))):
         inertia = link.link.inertia.copy()
         if not inertia[i, j]:
             continue
         inertia[i, j] = inertia[j, i] = inertia[i, j] * 10.0**power
         placed = turn @ inertia @ turn.T
-        changed = replace(part, inertia=placed)
-        if changed.flaw or density_of(changed, ()) > DENSEST:
-            continue
-        if hulls:
-            fits = [
-                unlike(placed, hull.solid.inertia) < ALIKE and SLIP[0] < ratio(placed, hull.solid.inertia * part.mass) < SLIP[1]
-                for hull in hulls
-            ]
-            if any(fits):
-                yield name, power, placed
-        elif abs(power) == 1 and i == j:  # without shapes, a slip of one digit of a moment
+        like_hull = not hulls or any(_is_like(placed, hull, part.mass) for hull in hulls)
+        like_twin = mirrored is None or _close(placed, mirrored.inertia)
+        if like_hull and like_twin and _is_right(link, replace(part, inertia=placed), hulls, body):
             yield name, power, placed
 
 
-def _size(link: RobotLink, part: Piece, hulls: Sequence[Hull], body: Body, solid: Piece | None) -> Fault | None:
-    """Return the fault of an inertia that is too small or too large for the mass and the shapes."""
+def _is_like(inertia: Array, hull: Hull, mass: float) -> bool:
+    """Return True if an inertia has the proportions of a hull, and about its size."""
+    return unlike(inertia, hull.solid.inertia) < ALIKE and SLIP[0] < ratio(inertia, hull.solid.inertia * mass) < SLIP[1]
+
+
+@dataclass(frozen=True)
+class Size:
+    """The size of an inertia, compared with the shapes.
+
+    `relative` is the inertia relative to that of the hull at the same mass, `alike` if it has the proportions of a hull,
+    `density` that of a body with this mass and inertia, kg/m^3, and `far` the `reach`. `small`, `large` and `slipped` are what
+    makes it wrong.
+    """
+
+    relative: float
+    alike: bool
+    density: float
+    far: float
+    small: bool
+    large: bool
+    slipped: bool
+
+
+def _measure(part: Piece, hulls: Sequence[Hull], body: Body, link: RobotLink) -> Size:
     ratios = [ratio(part.inertia, hull.solid.inertia * part.mass) for hull in hulls]
     relative = min(ratios, key=lambda value: abs(math.log(value))) if ratios and min(ratios) > 0 else 1.0
     alike = [hull for hull in hulls if unlike(part.inertia, hull.solid.inertia) < ALIKE]
     density = density_of(part, alike if relative < LIGHT else ())  # a plate may be drawn too thin
-    far = reach(part.place(body.to_root(link)), body.hull) if body.hull else 0.0
-    small, large = density > DENSEST, far > FARTHEST[1] and (relative > HEAVY or not solid)
+    placed = part.place(body.to_root(link))
+    far = reach(placed, body.hull) if body.hull else 0.0
+    beyond = bool(ratios) and body.hull is not None and overhang(placed, body.hull) > OVERHANG
+    large = far > FARTHEST[1] and (relative > HEAVY or not ratios or beyond)
     slipped = bool(alike) and relative > SLIPPED and far > FARTHEST[0]
+    return Size(relative, bool(alike), density, far, density > DENSEST, large, slipped)
+
+
+def _size(
+    link: RobotLink, part: Piece, hulls: Sequence[Hull], body: Body, solid: Piece | None, twin: tuple[Pair, bool] | None
+) -> Fault | None:
+    """Return the fault of an inertia that is too small or too large for the mass and the shapes."""
+    size = _measure(part, hulls, body, link)
     text = f"moments {list_numbers(np.linalg.eigvalsh(part.inertia))} kg m^2 for {part.mass:.4g} kg"
-    text += f", {_times(relative)} what its shapes have" if solid else ""
+    text += f", {_times(size.relative)} what its shapes have" if solid else ""
     expected = solid or _ball(part)
-    if small:
-        text += f"; a body like this would have {_rounded(density)} kg/m^3"
-    elif far > FARTHEST[0]:
-        text += f"; its radius of gyration is {math.sqrt(far):.2g} times as far as its shapes reach"
-    if not (small or large or slipped):
-        doubt = Fault("inertia outside the shapes", text, far, FARTHEST[0], "times", "shapes", expected)
-        return replace(doubt, verdict=Verdict.UNDECIDED) if far > FARTHEST[0] else None
-    error, allowed, unit, by = (density, DENSEST, "kg/m^3", MATERIALS) if small else (far, FARTHEST[0], "times", "shapes")
-    if large and (moved := _about_the_origin(part, hulls)):
+    if size.small:
+        text += f"; a body like this would have {float(f'{size.density:.4g}'):,.10g} kg/m^3"
+    elif size.far > FARTHEST[0]:
+        text += f"; its radius of gyration is {math.sqrt(size.far):.3g} times as far as its shapes reach"
+    if moved := _moved_twice(link, part, hulls, body, size):
+        text += "; about the origin of the link it is the inertia of its shapes"
         repair = "subtract the term of the parallel axis theorem: the inertia is about the origin of the link"
-        return Fault("inertia moved twice", text, error, allowed, unit, by, moved, repair)
-    if is_placeholder(link.link.inertia):
-        return Fault("placeholder inertia", text, error, allowed, unit, by, expected, "")
-    powers = [power for power in range(-6, 7) if power and SLIP[0] < relative * 10.0**power < SLIP[1]] if alike else []
-    if len(powers) == 1:
-        power = powers[0]
-        repaired, repair = replace(part, inertia=part.inertia * 10.0**power), f"multiply the inertia by 10^{power}"
-        weight = part.mass * 10.0**-power
-        volume = max(hull.volume for hull in hulls)
-        usual = DENSITIES[0] < weight / volume < DENSITIES[1]
-        if not DENSITIES[0] < part.mass / volume < DENSITIES[1] and usual:
-            repaired, repair = replace(part, mass=weight), f"multiply the mass by 10^{-power}"
-        return Fault("decimal slip", text, error, allowed, unit, by, repaired, repair, numbers={"power": float(power)})
-    key = "inertia too small" if small else "inertia outside the shapes"
-    return Fault(key, text, error, allowed, unit, by, expected)
-
-
-def _about_the_origin(part: Piece, hulls: Sequence[Hull]) -> Piece | None:
-    """Return a part with an inertia about the origin of the link, moved to its centre, if it then is like a hull."""
-    moved = replace(part, inertia=part.inertia - steiner(part.mass, part.com))
-    alike = (
-        unlike(moved.inertia, hull.solid.inertia) < ALIKE
-        and SLIP[0] < ratio(moved.inertia, hull.solid.inertia * part.mass) < SLIP[1]
-        for hull in hulls
+        error = float(np.linalg.norm(part.inertia - moved.inertia) / np.linalg.norm(moved.inertia))
+        return Fault("inertia moved twice", text, error, 0.0, "relative", "shapes", moved, repair)
+    if not (size.small or size.large or size.slipped):
+        doubt = Fault("inertia outside the shapes", text, size.far, FARTHEST[0], "times", "shapes", expected)
+        return replace(doubt, verdict=Verdict.UNDECIDED) if size.far > FARTHEST[0] else None
+    error, allowed, unit, by = (
+        (size.density, DENSEST, "kg/m^3", MATERIALS) if size.small else (size.far, FARTHEST[0], "times", "shapes")
     )
-    return moved if np.linalg.norm(part.com) > 0 and not moved.flaw and any(alike) else None
+    if is_placeholder(link.link.inertia) and link.link.rounding > NO_DIGITS:
+        fault = Fault("placeholder inertia", text, error, allowed, unit, by, expected)
+    elif slips := list(_slips(link, part, hulls, body, size)):
+        told = [slip for slip in slips if _agrees_with_twin(slip[0], part, twin)]
+        repaired, repair, power = (told or slips)[0]
+        if len(told) != 1:
+            text += f"; {' or '.join(slip[1] for slip in slips)} would repair it, and the file does not show which"
+            repair = ""
+        elif _is_in_inches(size.relative, power):
+            text += f"; inches or feet instead of metres explain it better than to {repair}"
+            repair = ""
+        fault = Fault(
+            "decimal slip", text, error, allowed, unit, by, repaired, repair, numbers={"power": float(power)} if repair else {}
+        )
+    else:
+        fault = Fault(
+            "inertia too small" if size.small else "inertia outside the shapes", text, error, allowed, unit, by, expected
+        )
+    sparse = spread_density(part) < SPARSEST
+    return fault if size.small or sparse else _unless_symbols(fault, body)
 
 
+def _slips(link: RobotLink, part: Piece, hulls: Sequence[Hull], body: Body, size: Size) -> Iterator[tuple[Piece, str, int]]:
+    """Yield the repairs of the inertia or the mass by a power of ten after which the link is right."""
+    if not size.alike:
+        return
+    volume = max(hull.volume for hull in hulls)
+    for power in range(-POWERS, POWERS + 1):
+        if not power or not SLIP[0] < size.relative * 10.0**power < SLIP[1]:
+            continue
+        inertia, mass = part.inertia * 10.0**power, part.mass * 10.0**-power
+        for repaired, text, exponent in (
+            (replace(part, inertia=inertia), "multiply the inertia by", power),
+            (replace(part, mass=mass), "multiply the mass by", -power),
+        ):
+            usual = DENSITIES[0] < repaired.mass / volume < DENSITIES[1]
+            if usual and _is_right(link, repaired, hulls, body):
+                yield repaired, f"{text} 10^{exponent}", exponent
+
+
+def _agrees_with_twin(repaired: Piece, part: Piece, twin: tuple[Pair, bool] | None) -> bool:
+    """Return False if a repair leaves or makes a difference from the twin. A twin with the same slip shows nothing."""
+    if twin is None:
+        return True
+    other = part_of(twin[0].left if twin[1] else twin[0].right)
+    return bool(other.flaw) or _differs(other, part) < TWINS[0] or _differs(other, repaired) < TWINS[1]
+
+
+def _differs(part: Piece, other: Piece) -> float:
+    """Return the larger relative difference of masses and principal moments."""
+    moments = [np.linalg.eigvalsh(piece.inertia) for piece in (part, other)]
+    of_moments = float(np.abs(moments[1] - moments[0]).max() / max(np.abs(moments).max(), 1e-300))
+    return max(of_moments, abs(part.mass - other.mass) / max(part.mass, other.mass))
+
+
+def _is_in_inches(relative: float, power: int) -> bool:
+    """Return True if inches or feet explain the size of an inertia relative to the mass better than a power of ten."""
+    away = abs(math.log(relative * 10.0 ** -abs(power))) if relative > 1 else math.inf
+    return any(abs(relative * foot**2 - 1) < NOTHING and away > 2 * NOTHING for foot in (0.0254, 0.3048))
+
+
+def _moved_twice(link: RobotLink, part: Piece, hulls: Sequence[Hull], body: Body, size: Size) -> Piece | None:
+    """Return the inertia about the centre of mass of a part whose inertia is about the origin of the link, or None.
+
+    About the origin it is the inertia of a hull, I_c + m (d.d 1 - d d'), to its digits, and about the centre it is not. If it
+    is outside the shapes in any case, to a few per cent, or only in its proportions if it is far outside.
+    """
+    moved = replace(part, inertia=part.inertia - steiner(part.mass, part.com))
+    if not np.linalg.norm(part.com) > 0 or moved.flaw or not _is_right(link, moved, hulls, body):
+        return None
+    tolerance = ORIGIN[1] if size.far > ORIGIN[2] else ORIGIN[0]
+    for hull in hulls:
+        own = hull.solid.inertia * part.mass
+        if np.linalg.norm(part.inertia - own) < ORIGIN[3] * np.linalg.norm(own):
+            return None
+    exact = any(
+        np.linalg.norm(moved.inertia - own) < max(part.rounding, tolerance * float(np.linalg.norm(own)))
+        for own in (hull.solid.inertia * part.mass for hull in hulls)
+    )
+    return moved if exact or (size.large and any(_is_like(moved.inertia, hull, part.mass) for hull in hulls)) else None
+
+
+ORIGIN = (1e-3, 0.03, 1.1, 0.2)
+"""Relative difference up to which an inertia about the origin is that of a hull; the same if its `reach` is beyond the third
+number, so that it is wrong in any case; difference about the centre of mass below which it is not about the origin."""
+POWERS = 9
+"""Largest power of ten of a slip: g mm^2 are 1e-9 kg m^2."""
+OVERHANG = 0.1
+"""Distance of the radius of gyration from twice the reach of the shapes, relative to their size, that shows other axes."""
 DENSITIES = (50.0, 9000.0)
 """Densities of hulls of right links, kg/m^3."""
 
@@ -586,7 +780,8 @@ def _centre(link: RobotLink, part: Piece, body: Body) -> Fault | None:
     if len(repairs) == 1:
         repair, com = repairs[0]
         expected = replace(part, com=com)
-    verdict = Verdict.WRONG if relative > OUTSIDE[1] else Verdict.UNDECIDED
+    # A part without shapes of its own may be outside the shapes of what it is fixed to.
+    verdict = Verdict.WRONG if relative > OUTSIDE[1] and link.shapes else Verdict.UNDECIDED
     return Fault(
         "centre of mass outside the shapes", text, relative, OUTSIDE[0], "relative", "shapes", expected, repair, verdict
     )
@@ -630,7 +825,14 @@ def _compare_twins(pair: Pair, faults: dict[str, list[Fault]], bodies: Mapping[s
     limit = TURNED if name == "products of inertia" else TWINS[1]
     if worst < (TURNED if name == "products of inertia" else TWINS[0]):
         return
+    own = [_hulls(link) for link in (pair.left, pair.right)]
+    same_shapes = _have_same_shapes(*own)
+    fitting = [_fits(part, hulls) for part, hulls in zip((left, right), own, strict=True)]
+    if same_shapes is False and all(fitting):
+        return  # two links that differ, and both are right
     verdict = Verdict.WRONG if worst > limit else Verdict.UNDECIDED
+    if same_shapes is False or (name in ("mass", "moments") and _differ_in_mass_only(left, right)):
+        verdict = Verdict.UNDECIDED  # a design may have other shapes, materials or contents on each side
     suspects = _suspects(pair, faults)
     for link, other, of_right in ((pair.left, pair.right, False), (pair.right, pair.left, True)):
         if link not in suspects or any(fault.verdict is Verdict.WRONG for fault in faults[link.name]):
@@ -640,8 +842,38 @@ def _compare_twins(pair: Pair, faults: dict[str, list[Fault]], bodies: Mapping[s
         verb = "differs" if name in ("mass", "centre of mass") else "differ"
         text = f"the {name} {verb} from {other.name!r} by {100 * worst:.3g} %"
         text += ": one of the two is wrong" if verdict is Verdict.WRONG and not alone else ""
-        repair = f"the mirrored values of {other.name!r}" if alone and expected is not None else ""
+        repaired = expected is not None and _is_right(link, expected, _hulls(link), bodies[link.name])
+        repair = f"the mirrored values of {other.name!r}" if alone and repaired else ""
         faults[link.name].insert(0, Fault("twins differ", text, worst, limit, "relative", "twin", expected, repair, verdict))
+
+
+SAME_SHAPES = 0.1
+"""Relative difference of volumes and moments up to which the hulls of twins have the same shape."""
+FITS = 0.2
+"""Relative difference from the inertia of the hull up to which a link fits its own shapes."""
+
+
+def _have_same_shapes(left: Sequence[Hull], right: Sequence[Hull]) -> bool | None:
+    """Return whether the hulls of twins have the same shapes, except for the axes; None if a twin has no shapes."""
+    if not left or not right:
+        return None
+    differences = []
+    for hull, other in zip(left, right, strict=False):
+        pairs = [(hull.volume, other.volume), *zip(*(np.linalg.eigvalsh(h.solid.inertia) for h in (hull, other)), strict=True)]
+        differences += [float(abs(a - b) / max(a, b)) for a, b in pairs]
+    return max(differences) < SAME_SHAPES
+
+
+def _fits(part: Piece, hulls: Sequence[Hull]) -> bool:
+    """Return True if an inertia is that of a hull with uniform density."""
+    solids = [hull.solid.inertia * part.mass for hull in hulls]
+    return any(np.linalg.norm(part.inertia - solid) < FITS * np.linalg.norm(solid) for solid in solids)
+
+
+def _differ_in_mass_only(left: Piece, right: Piece) -> bool:
+    """Return True if twins have the same inertia for 1 kg."""
+    moments = [np.linalg.eigvalsh(part.inertia) / part.mass for part in (left, right)]
+    return bool(np.abs(moments[0] - moments[1]).max() < TWINS[0] * np.abs(moments).max())
 
 
 def _suspects(pair: Pair, faults: Mapping[str, list[Fault]]) -> list[RobotLink]:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from ..finding import Verification
+from ..finding import Verdict, Verification
 from .links import verify_links
 from .loaded import installed_loaders, verify_files
 
@@ -30,14 +30,21 @@ def verify_models(
     links = verify_links(files, lambda done, what: tell(share * done, what), search)
     if not load:
         return links
-    loaded = verify_files(files, engines, lambda done, what: tell(share + (1 - share) * done, what), search)
-    return [_joined(first, second) for first, second in zip(links, loaded, strict=True)]
+    paths = list(dict.fromkeys(files))
+    readable = [path for path, first in zip(paths, links, strict=True) if first.verdict is not Verdict.NOT_TESTED]
+    readable = readable if len(paths) > 1 else paths  # a file that is alone and cannot be read is bad input
+    if not readable:
+        return links
+    bodies = verify_files(readable, engines, lambda done, what: tell(share + (1 - share) * done, what), search)
+    loaded = dict(zip(readable, bodies, strict=True))
+    return [_joined(first, loaded[path]) if path in loaded else first for path, first in zip(paths, links, strict=True)]
 
 
 def _joined(links: Verification, bodies: Verification) -> Verification:
     """Return one verification of a file from the two."""
     return replace(
         bodies,
+        subject=links.subject,
         findings=(*links.findings, *bodies.findings),
         reason="; ".join(filter(None, [links.reason, bodies.reason])),
         notes=tuple(dict.fromkeys([*links.notes, *bodies.notes])),

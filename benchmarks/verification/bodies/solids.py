@@ -12,8 +12,8 @@ from scipy.spatial import ConvexHull, QhullError
 from conservative.attitude import Array
 from conservative.references.model_files.pieces import Piece, weigh
 
-DENSEST = 12000.0
-"""Density that no part of a robot has, kg/m^3. Motors have at most 8,000, copper 8,960, lead 11,340."""
+DENSEST = 22600.0
+"""Density of osmium, kg/m^3, the densest material. Counterweights of tungsten have 19,250, motors at most 8,000."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +75,13 @@ def reach(part: Piece, hull: Hull) -> float:
     return float((values / np.maximum(farthest, 1e-12) ** 2).max())
 
 
+def overhang(part: Piece, hull: Hull) -> float:
+    """Return how far the radius of gyration along an axis is beyond twice the reach of the hull, relative to its size."""
+    values, axes = second_moments(part)
+    farthest = np.abs((hull.points - part.com) @ axes).max(axis=0)
+    return float((np.sqrt(np.maximum(values, 0.0)) - 2 * farthest).max() / hull.size)
+
+
 def density_of(part: Piece, hulls: Sequence[Hull]) -> float:
     """Return the density, kg/m^3, of a body with a mass and inertia that has the proportions of a ball or of one of the hulls.
 
@@ -87,6 +94,13 @@ def density_of(part: Piece, hulls: Sequence[Hull]) -> float:
     ball = part.mass / (4 / 3 * math.pi * radius**3)
     scaled = [part.mass / hull.volume * ratio(part.inertia, hull.solid.inertia * part.mass) ** -1.5 for hull in hulls]
     return float(min(scaled, default=ball))
+
+
+def spread_density(part: Piece) -> float:
+    """Return the density, kg/m^3, of the solid ellipsoid with a mass and inertia; inf for a plane or a line."""
+    values, _ = second_moments(part)
+    volume = 4 / 3 * math.pi * float(np.prod(np.sqrt(5 * np.maximum(values, 0.0))))
+    return part.mass / volume if volume > 0 else math.inf
 
 
 def ratio(inertia: Array, other: Array) -> float:

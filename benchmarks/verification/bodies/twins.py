@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -63,9 +63,13 @@ def part_of(link: RobotLink) -> Piece:
 
 
 def find_pairs(links: Sequence[RobotLink]) -> list[Pair]:
-    """Return the pairs of left and right links that have a mass."""
+    """Return the pairs of left and right links that have a mass. A link is not the twin of a link that carries it."""
     by_name = {link.name: link for link in links}
-    pairs = [(link, by_name[other]) for link in links if (other := other_side(link.name)) in by_name and _is_left(link.name)]
+    pairs = []
+    for link in filter(lambda link: _is_left(link.name), links):
+        # `left_arm::l` is the twin of `right_arm::r`, or of `right_arm::l` if both models have a link `l`.
+        names = (other_side(link.name), other_side(link.name, first=True))
+        pairs += [(link, by_name[name]) for name in names if name in by_name][:1]
     plane = _mirror([(left.link.pose[:3, 3], right.link.pose[:3, 3]) for left, right in pairs])
     children: dict[str, list[RobotLink]] = {}
     for link in links:
@@ -74,14 +78,28 @@ def find_pairs(links: Sequence[RobotLink]) -> list[Pair]:
         Pair(left, right, _maps(left, right, plane, children))
         for left, right in pairs
         if left.link.mass > 0 and right.link.mass > 0 and left.written and right.written
+        if not (_carries(left, right, by_name) or _carries(right, left, by_name))
     ]
 
 
-def other_side(name: str) -> str:
-    """Return a name with left and right exchanged; "" if it has neither."""
+def _carries(link: RobotLink, other: RobotLink, by_name: Mapping[str, RobotLink]) -> bool:
+    """Return True if a link is between the root and another one."""
+    seen = set[str]()
+    while other.parent in by_name and other.parent not in seen:
+        if other.parent == link.name:
+            return True
+        seen.add(other.parent)
+        other = by_name[other.parent]
+    return False
+
+
+def other_side(name: str, first: bool = False) -> str:
+    """Return a name with left and right exchanged, or only the `first` one; "" if it has neither."""
     words = _WORDS.findall(name)
-    changed = [_like(_OTHER[word.lower()], word) if word.lower() in _OTHER else word for word in words]
-    return "".join(changed) if changed != words else ""
+    sides = [number for number, word in enumerate(words) if word.lower() in _OTHER]
+    for number in sides[:1] if first else sides:
+        words[number] = _like(_OTHER[words[number].lower()], words[number])
+    return "".join(words) if sides else ""
 
 
 def _is_left(name: str) -> bool:

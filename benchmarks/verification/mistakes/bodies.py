@@ -293,7 +293,7 @@ FILES: tuple[FileMistake, ...] = (
     ),
     FileMistake(
         "decimal slip",
-        "A number is too large or too small by a power of ten, which 10^{power:.0f} repairs",
+        "A number is too large or too small by a power of ten",
         lambda link, power=-1.0: _with_inertia(link, lambda inertia: inertia / 10.0**power),
         numbers=(Number("power"),),
     ),

@@ -3,17 +3,19 @@
 import json
 import re
 from dataclasses import dataclass, field, replace
+from itertools import product
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 from scipy.spatial.transform import Rotation
 
+from conservative.benchmarks.verification.bodies import links as links_module
 from conservative.benchmarks.verification.bodies import models
 from conservative.benchmarks.verification.bodies.links import judge
 from conservative.benchmarks.verification.bodies.solids import density_of, hull_of, reach
 from conservative.benchmarks.verification.bodies.twins import other_side
-from conservative.benchmarks.verification.finding import Verdict
+from conservative.benchmarks.verification.finding import Finding, Verdict, Verification
 from conservative.benchmarks.verification.mistakes import BY_KEY
 from conservative.benchmarks.verification.mistakes.bodies import FILES
 from conservative.benchmarks.verification.verify import verify
@@ -215,6 +217,10 @@ FAULTS = {
 """Keys of the mistakes, the link (0, 1, or 2 for one of a pair), the change, and a part of the repair, if there is one."""
 
 
+OPEN = {("slip up", "rover"), ("slip up", "drone")}
+"""Of light bodies, with 440 and 670 kg/m^3: ten times the mass is as plausible as a tenth of the inertia."""
+
+
 def test_there_are_forty_faults():
     assert len(FAULTS) * len(ROBOTS) == 40
     assert {key for key, *_ in FAULTS.values()} <= set(BY_KEY)
@@ -232,7 +238,10 @@ def test_a_planted_fault_is_found_named_and_repaired(tmp_path, fault, robot):
     others = {case: (finding.verdict, finding.detail) for case, finding in found.items() if case != name}
     assert {verdict for verdict, _ in others.values()} == {Verdict.RIGHT}, others
     assert found[name].effect
-    if repair:
+    if (fault, robot) in OPEN:
+        assert not found[name].repair
+        assert "multiply the inertia by 10^-1 or multiply the mass by 10^1" in found[name].detail
+    elif repair:
         assert repair in found[name].repair
 
 
@@ -301,11 +310,189 @@ def test_twins_may_have_axes_of_their_own(tmp_path):
 def test_twins_that_their_shapes_do_not_tell_apart_are_both_named(tmp_path):
     links = biped()
     made = links["right_shin"].filled()
-    links["right_shin"] = replace(made, mass=1.6 * made.mass, inertia=1.6 * made.inertia)
+    links = {name: replace(link, shapes=False) if "shin" in name else link for name, link in links.items()}
+    links["right_shin"] = replace(made, inertia=1.6 * made.inertia, shapes=False)
     found = findings(tmp_path, links)
     for name in ("left_shin", "right_shin"):
         assert (found[name].verdict, found[name].mistake) == (Verdict.WRONG, "twins differ")
         assert not found[name].repair
+
+
+def test_twins_that_differ_in_their_mass_only_are_undecided(tmp_path):
+    """A box may be full on one side. With the mass alone, the inertia contradicts the shapes."""
+    for factor in (1.6, 3.0):
+        links = biped()
+        made = links["right_shin"].filled()
+        links["right_shin"] = replace(made, mass=factor * made.mass, inertia=factor * made.inertia)
+        found = findings(tmp_path, links)
+        assert {found[name].verdict for name in ("left_shin", "right_shin")} == {Verdict.UNDECIDED}
+    links["right_shin"] = replace(made, mass=3 * made.mass)
+    assert findings(tmp_path, links)["right_shin"].mistake == "twins differ"
+
+
+def test_twins_with_other_shapes_that_fit_their_inertias_are_right(tmp_path):
+    box = (((0.3, 0.1, 0.2), (0, 0, 0), (0, 0, 0)),)
+    for name in ("box", "bracket"):
+        links = {
+            "base": arm()["base"],
+            f"left_{name}": Made(3.0, box, "base", (0, 0.5, 0)),
+            f"right_{name}": Made(0.5, (((0.02, 0.02, 0.3), (0, 0, 0), (0, 0, 0)),), "base", (0, -0.5, 0)),
+        }
+        assert {finding.verdict for finding in findings(tmp_path, links).values()} == {Verdict.RIGHT}
+        made = links[f"right_{name}"].filled()
+        links[f"right_{name}"] = replace(made, inertia=1.6 * made.inertia)
+        found = findings(tmp_path, links)
+        assert Verdict.WRONG not in {finding.verdict for finding in found.values()}
+
+
+def test_a_link_is_not_the_twin_of_one_that_it_is_on(tmp_path):
+    links = {
+        "base": arm()["base"],
+        "link_r": Made(1.0, (((0.1, 0.1, 0.1), (0, 0, 0), (0, 0, 0)),), "base", inertia=0.0017 * np.eye(3), shapes=False),
+        "middle": Made(1.0, (((0.1, 0.1, 0.1), (0, 0, 0), (0, 0, 0)),), "link_r"),
+        "link_l": Made(3.0, (((0.3, 0.1, 0.1), (0, 0, 0), (0, 0, 0)),), "middle", shapes=False),
+    }
+    assert {finding.verdict for finding in findings(tmp_path, links).values()} == {Verdict.RIGHT}
+    links["link_l"] = replace(links["link_l"], parent="base")
+    assert findings(tmp_path, links)["link_l"].mistake == "twins differ"
+
+
+# --------------------------------------------------------------------------------------------------- slips and their repairs
+
+
+BOX = ((0.2, 0.1, 0.05), (0, 0, 0), (0, 0, 0))
+
+
+def one(mass, times_mass=1.0, times_inertia=1.0, boxes=(BOX,), **others):
+    """A base with a link `a` of boxes, whose mass and inertia are multiplied by factors."""
+    made = Made(mass, boxes, "base").filled()
+    made = replace(made, mass=mass * times_mass, inertia=made.inertia * times_inertia)
+    return {"base": arm()["base"], "a": replace(made, **others)}
+
+
+@pytest.mark.parametrize("power", [-9, -7, -6, -5, -4, -3, -2, 2, 3, 4, 6, 9])
+def test_units_of_an_inertia_are_powers_of_ten(tmp_path, power):
+    found = findings(tmp_path, one(3.0, times_inertia=10.0**-power))["a"]
+    assert (found.verdict, found.mistake, found.repair) == ("wrong", "decimal slip", f"multiply the inertia by 10^{power}")
+
+
+def test_a_repair_that_is_offered_leaves_the_link_right(tmp_path):
+    """Mass and inertia are multiplied by any powers of ten: g and g mm^2, or a slip in one or in both."""
+    count = 0
+    for p, q in product(range(-3, 4), (-9, -7, -6, -3, -2, -1, 0, 1, 2, 3, 6, 7, 9)):
+        for mass in (0.3, 3.0):
+            found = findings(tmp_path, one(mass, 10.0**p, 10.0**q))["a"]
+            if match := re.fullmatch(r"multiply the (mass|inertia) by 10\^(-?\d+)", found.repair):
+                count += 1
+                if match[1] == "mass":
+                    repaired = one(mass, 10.0 ** (p + int(match[2])), 10.0**q)
+                else:
+                    repaired = one(mass, 10.0**p, 10.0 ** (q + int(match[2])))
+                assert findings(tmp_path, repaired)["a"].verdict is Verdict.RIGHT
+            else:
+                assert not found.repair
+    assert count > 50  # measured: 60 of 182
+
+
+def test_a_slip_that_mass_and_inertia_explain_has_a_repair_only_if_the_twin_shows_which(tmp_path):
+    links = one(3.0, times_mass=0.1)
+    found = findings(tmp_path, links)["a"]
+    assert (found.verdict, found.mistake, found.repair) == (Verdict.WRONG, "decimal slip", "")
+    good = replace(one(3.0)["a"], at=(0, 0.2, 0))
+    for wrong, repair in (
+        (replace(links["a"], at=(0, -0.2, 0)), "multiply the mass by 10^1"),
+        (replace(one(3.0, times_inertia=10)["a"], at=(0, -0.2, 0)), "multiply the inertia by 10^-1"),
+    ):
+        pair = {"base": links["base"], "left_a": good, "right_a": wrong}
+        found = findings(tmp_path, pair)
+        assert found["right_a"].repair == repair
+        assert found["left_a"].verdict is Verdict.RIGHT
+        both = {"base": links["base"], "left_a": replace(wrong, at=(0, 0.2, 0)), "right_a": wrong}  # it shows nothing then
+        assert findings(tmp_path, both)["right_a"].repair == findings(tmp_path, {**links, "a": wrong})["a"].repair
+
+
+def test_pounds_and_inches_are_no_power_of_ten(tmp_path):
+    found = findings(tmp_path, one(3.0, 1 / 0.45359237, 1 / 2.9263965e-4))["a"]
+    assert (found.verdict, found.repair) == (Verdict.WRONG, "")
+    assert "inches" in found.detail
+
+
+@pytest.mark.parametrize("shapes", [True, False])
+def test_a_slip_of_one_moment_has_a_repair_only_with_shapes(tmp_path, shapes):
+    made = one(3.0)["a"].filled()
+    links = one(3.0, inertia=made.inertia * np.diag([1, 10, 1]), shapes=shapes)
+    found = findings(tmp_path, links)["a"]
+    assert found.verdict is Verdict.WRONG
+    assert found.repair == ("multiply iyy by 10^-1" if shapes else "")
+
+
+@pytest.mark.parametrize(
+    ("moments", "verdict"),
+    [
+        ((0.1, 0.1, 0.3), "undecided"),  # 0.149, 0.149 and 0.251 are rounded to it
+        ((0.1, 0.1, 0.4), "wrong"),
+        ((0.1, 0.1, 0.31), "wrong"),
+        ((0.11, 0.11, 0.23), "right"),  # a rounding of three halves of a digit, below a tenth of the moment
+        ((0.11, 0.11, 0.24), "wrong"),
+        ((0.1, 0.1, 0.2), "right"),
+    ],
+)
+def test_digits_excuse_a_moment(tmp_path, moments, verdict):
+    links = one(1.0, inertia=np.diag(moments), shapes=False)
+    assert findings(tmp_path, links)["a"].verdict == verdict
+
+
+@pytest.mark.parametrize(("density", "verdict"), [(19250, "right"), (22500, "right"), (60000, "wrong")])
+def test_tungsten_and_gold_are_materials(tmp_path, density, verdict):
+    volume = 0.05**3
+    found = findings(tmp_path, one(density * volume, boxes=(((0.05,) * 3, (0, 0, 0), (0, 0, 0)),)))["a"]
+    assert found.verdict == verdict
+
+
+def test_other_axes_of_a_rod_are_wrong(tmp_path):
+    rod = ((0.4, 0.04, 0.04), (0, 0, 0), (0, 0, 0))
+    made = Made(1.0, (rod,)).filled()
+    found = findings(tmp_path, one(1.0, boxes=(rod,), inertia=made.inertia[np.ix_([1, 0, 2], [1, 0, 2])]))["a"]
+    assert (found.verdict, found.mistake) == (Verdict.WRONG, "inertia outside the shapes")
+
+
+@pytest.mark.parametrize("size", [(0.4, 0.04, 0.04), (0.3, 0.1, 0.1), (0.2, 0.12, 0.12)])
+@pytest.mark.parametrize("angle", [0.3, 0.6, 1.2])
+def test_the_sign_of_products_is_found_for_thin_and_thick_links(tmp_path, size, angle):
+    rod = (size, (0, 0, 0), (0, 0, angle))
+    made = Made(1.0, (rod,)).filled()
+    found = findings(tmp_path, one(1.0, boxes=(rod,), inertia=negated(made)["inertia"]))["a"]
+    assert (found.mistake, found.repair) == ("sign of the products of inertia", "change the sign of ixy")
+    turned = min(2 * angle, np.pi - 2 * angle)
+    assert f"turned by {np.degrees(turned):.0f} degrees" in found.effect
+
+
+@pytest.mark.parametrize(
+    ("size", "place"), [((0.4, 0.03, 0.03), (0.2, 0, 0)), ((0.4, 0.05, 0.06), (0.2, 0, 0.05)), ((0.2, 0.1, 0.1), (0.4, 0, 0))]
+)  # fmt: skip
+def test_an_inertia_about_the_origin_of_the_link(tmp_path, size, place):
+    box = (size, place, (0, 0, 0))
+    d = np.array(place, float)
+    made = Made(1.0, (box,)).filled()
+    about = made.inertia + d @ d * np.eye(3) - np.outer(d, d)
+    found = findings(tmp_path, one(1.0, boxes=(box,), inertia=about))["a"]
+    assert (found.verdict, found.mistake) == (Verdict.WRONG, "inertia moved twice")
+    assert findings(tmp_path, one(1.0, boxes=(box,)))["a"].verdict is Verdict.RIGHT
+
+
+def test_a_proxy_that_cannot_hold_the_mass_does_not_bound_the_inertia(tmp_path):
+    proxy = ((0.02, 0.02, 0.02), (0, 0, 0), (0, 0, 0))
+    found = findings(tmp_path, one(2.0, boxes=(proxy,), inertia=np.diag([0.00213, 0.0277, 0.0277])))["a"]
+    assert found.verdict is Verdict.UNDECIDED
+    assert findings(tmp_path, one(2.0, boxes=(proxy,), inertia=30 * np.eye(3)))["a"].verdict is Verdict.WRONG
+
+
+def test_a_link_without_a_mass_or_with_a_negative_one(tmp_path):
+    for mass, effect in ((0.0, "without limit under a force"), (-1.0, "the other way")):
+        text = urdf(one(1.0)).replace('mass value="1.0"', f'mass value="{mass}"')
+        found = findings(tmp_path, {}, text)["a"]
+        assert effect in found.effect
+        assert f"{mass:g} kg" in found.detail
 
 
 @pytest.mark.parametrize(
@@ -414,6 +601,134 @@ def test_sdf(tmp_path):
     assert findings(tmp_path, {}, SDF.format(com="0 0.5 0", iyy=0.02), "m.sdf")["base"].mistake.startswith("centre")
 
 
+MOVING = """<sdf version="1.9"><model name="m">{static}<link name="base"><inertial><mass>3</mass><inertia><ixx>0.02</ixx>
+<iyy>0.02</iyy><izz>0.02</izz></inertia></inertial></link><link name="tip">{inertial}
+<visual name="v"><geometry><box><size>0.2 0.2 0.2</size></box></geometry></visual></link>
+<joint name="j" type="{kind}"><parent>base</parent><child>tip</child></joint></model></sdf>"""
+SIX = "<inertial><mass>3</mass><inertia><ixx>0.02</ixx><iyy>0.02</iyy><izz>0.02</izz></inertia></inertial>"
+
+
+@pytest.mark.parametrize(
+    ("static", "inertial", "kind", "verdict"),
+    [
+        ("", "", "revolute", "wrong"),
+        ("", "<inertial/>", "revolute", "wrong"),
+        ("", "<inertial><mass>2</mass></inertial>", "revolute", "wrong"),
+        ("", SIX, "revolute", "right"),
+        ("", "", "fixed", "wrong"),  # it adds 1 kg m^2 to 0.02 kg m^2
+        ("<static>true</static>", "", "revolute", "right"),
+    ],
+)
+def test_the_default_of_sdf_is_a_placeholder(tmp_path, static, inertial, kind, verdict):
+    found = findings(tmp_path, {}, MOVING.format(static=static, inertial=inertial, kind=kind), "m.sdf")["tip"]
+    assert (found.verdict, found.mistake) == (verdict, "placeholder inertia" if verdict == "wrong" else "")
+
+
+def test_links_of_models_within_a_model_of_sdf(tmp_path):
+    """They have joints and twins in other models, and poses of all models that they are in."""
+    arm_ = '<model name="{}_arm"><pose>0 {} 0 0 0 0</pose><link name="l">{}{}</link></model>'
+    visual = '<visual name="v"><geometry><box><size>0.2 0.2 0.2</size></box></geometry></visual>'
+    heavy = SIX.replace("<iyy>0.02", "<iyy>0.03")
+    joints = "".join(
+        f'<joint name="{side}" type="{kind}"><parent>base</parent><child>{side}_arm::l</child></joint>'
+        for side, kind in (("left", "revolute"), ("right", "fixed"))
+    )
+    for inertial, verdict in ((SIX, Verdict.RIGHT), (heavy, Verdict.WRONG)):
+        models_ = arm_.format("left", 0.3, SIX, visual) + arm_.format("right", -0.3, inertial, visual)
+        text = f'<sdf version="1.9"><model name="m"><link name="base">{SIX}{visual}</link>{models_}{joints}</model></sdf>'
+        found = findings(tmp_path, {}, text, "m.sdf")
+        assert {name: finding.verdict for name, finding in found.items() if name != "right_arm::l"} == {
+            "base": Verdict.RIGHT, "left_arm::l": Verdict.RIGHT
+        }  # fmt: skip
+        assert found["right_arm::l"].verdict is verdict
+    (robot,) = read_robots_here(tmp_path / "m.sdf")
+    assert {link.name: (link.joint, link.link.pose[1, 3]) for link in robot.links} == {
+        "base": ("", 0), "left_arm::l": ("revolute", 0.3), "right_arm::l": ("fixed", -0.3)
+    }  # fmt: skip
+
+
+BODY = """#usda 1.0
+(metersPerUnit = 1
+ upAxis = "Z")
+def Xform "a" (prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsMassAPI"])
+{{
+    {body}
+    def Cube "c" ({collision})
+    {{
+        double size = 0.2
+        {collider}
+    }}
+}}
+"""
+COLLIDER = 'prepend apiSchemas = ["PhysicsCollisionAPI", "PhysicsMassAPI"]'
+
+
+@pytest.mark.parametrize(
+    ("body", "collision", "collider", "verdict", "mass"),
+    [
+        ("", COLLIDER, "", "right", 8.0),
+        ("float physics:mass = 2", COLLIDER, "", "right", 2.0),
+        ("float physics:mass = -2", COLLIDER, "", "right", 8.0),  # such a mass does not count
+        ("float physics:mass = 2\n    point3f physics:centerOfMass = (0, 3, 0)", COLLIDER, "", "wrong", 2.0),
+        ("float3 physics:diagonalInertia = (1, 1, 7)", COLLIDER, "", "wrong", 8.0),
+        ("float3 physics:diagonalInertia = (-1, 1, 1)", COLLIDER, "", "wrong", 8.0),
+        (
+            "",
+            COLLIDER,
+            "float physics:mass = 60\n        float3 physics:diagonalInertia = (0.001, 0.001, 0.001)",
+            "wrong",
+            60.0,
+        ),
+        ("", COLLIDER, "float physics:mass = 60", "right", 60.0),
+        ("float physics:mass = 2", "", "", "not tested", np.nan),
+        ("float3 physics:diagonalInertia = (1, 1, 1)", "", "", "not tested", np.nan),
+        ("", "", "", "not tested", np.nan),
+    ],
+)
+def test_usd_with_a_part_of_mass_and_inertia(tmp_path, body, collision, collider, verdict, mass):
+    """The rest follows from the colliders by the rules of ComputeMassProperties; without any it is not tested."""
+    pytest.importorskip("pxr")
+    text = BODY.format(body=body, collision=collision, collider=collider)
+    found = findings(tmp_path, {}, text, "m.usda")["/a"]
+    assert found.verdict == verdict, found
+    assert found.mass == pytest.approx(mass, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("joints", "wrong"),
+    [
+        ((("base", "a"),), 0),
+        ((("base", "gone"),), 1),
+        ((("gone", "a"),), 1),
+        ((("base", "a"), ("b", "a")), 1),
+    ],
+)
+def test_joints_that_parsers_refuse_are_wrong(tmp_path, joints, wrong):
+    links = {"base": arm()["base"], "a": one(3.0)["a"], "b": one(3.0)["a"]}
+    text = urdf({name: replace(link, parent="") for name, link in links.items()})
+    joint = '<joint name="j{}" type="revolute"><parent link="{}"/><child link="{}"/></joint>'
+    text = text.replace("</robot>", "".join(joint.format(k, *ends) for k, ends in enumerate(joints)) + "</robot>")
+    (tmp_path / "m.urdf").write_text(text)
+    (robot,) = read_robots_here(tmp_path / "m.urdf")
+    assert sum(finding.verdict is Verdict.WRONG for finding in judge(robot, "m.urdf")) == wrong
+
+
+def test_options_of_mujoco_that_change_the_masses_are_named(tmp_path):
+    pytest.importorskip("mujoco")
+    for option, named in (('balanceinertia="true"', True), ('boundinertia="0.1"', True), ('autolimits="true"', False)):
+        (tmp_path / "m.xml").write_text(mjcf().replace('balanceinertia="true"', option))
+        (robot,) = read_robots_here(tmp_path / "m.xml")
+        assert any(option.partition("=")[0] in note for note in robot.notes) is named
+
+
+def test_meshes_in_millimetres_are_noted(tmp_path):
+    for scale, noted in ((1000, True), (100, False), (1, False)):
+        text = urdf(one(3.0, boxes=((tuple(scale * np.array(BOX[0])), *BOX[1:]),), inertia=one(3.0)["a"].filled().inertia))
+        (tmp_path / f"{scale}.urdf").write_text(text)
+        (robot,) = read_robots_here(tmp_path / f"{scale}.urdf")
+        assert any("in mm" in note for note in links_module._notes(robot)) is noted
+
+
 COLLADA = """<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset><unit meter="0.01"/></asset>
 <library_geometries><geometry id="g"><mesh><source id="p">
 <float_array id="a" count="12">0 0 0 10 0 0 0 10 0 0 0 10</float_array>
@@ -503,6 +818,155 @@ def test_one_bad_file_of_a_library_is_not_tested_and_alone_it_is_bad_input(libra
     assert (bad.verdict, good.verdict) == (Verdict.NOT_TESTED, Verdict.RIGHT)
     with pytest.raises(BadInput, match="nan"):
         verify(str(broken), only="links")
+
+
+# ------------------------------------------------------------------------------------------- files that are not made for this
+
+
+TRIANGLE = 1e-3 * np.diag([1.0, 1.0, 3.11])
+"""An inertia that no body has, by more than its digits."""
+
+
+def broken_arm():
+    links = arm()
+    links["upper_arm"] = replace(links["upper_arm"], inertia=TRIANGLE)
+    return links
+
+
+def test_a_package_is_a_library_although_it_has_other_files(tmp_path, read_in_this_process):
+    package = tmp_path / "package"
+    for name in ("urdf", "launch", "meshes", ".git"):
+        (package / name).mkdir(parents=True)
+    (package / "package.xml").write_text("<package/>")
+    (package / "CMakeLists.txt").write_text("project(package)")
+    (package / "config.json").write_text('{"a": 1}')
+    (package / "launch" / "a.xml").write_text("<launch/>")
+    (package / "urdf" / "broken.urdf").write_text(urdf(broken_arm()))
+    (package / ".git" / "old.urdf").write_text(urdf(arm()))
+    for only in ("links", ()):
+        (found,) = verify(str(package), only=only)
+        assert (found.subject, found.verdict) == ("broken.urdf", Verdict.WRONG)
+        for name in ("package.xml", "launch/a.xml", "CMakeLists.txt", "config.json"):
+            assert any(name in note for note in found.notes)
+
+
+def test_models_below_a_model_are_verified_by_their_relative_names(tmp_path, read_in_this_process):
+    library = tmp_path / "library"
+    (library / "sub").mkdir(parents=True)
+    (library / "arm.urdf").write_text(urdf(arm()))
+    (library / "sub" / "arm.urdf").write_text(urdf(broken_arm()))
+    (library / "sub" / "empty.urdf").write_text("")
+    (library / "sub" / "scene.xml").write_text('<mujoco><include file="part.xml"/></mujoco>')
+    (library / "sub" / "part.xml").write_text("<mujocoinclude/>")
+    found = verify(str(library), only="links")
+    assert {file.subject: file.verdict for file in found} == {
+        "arm.urdf": Verdict.RIGHT,
+        "sub/arm.urdf": Verdict.WRONG,
+        "sub/empty.urdf": Verdict.NOT_TESTED,
+    }
+    assert any("sub/scene.xml" in note and "sub/part.xml" in note for note in found[0].notes)
+
+
+def test_a_recording_in_a_folder_of_models_needs_a_body(tmp_path, read_in_this_process):
+    (tmp_path / "arm.urdf").write_text(urdf(arm()))
+    (tmp_path / "run.csv").write_text("t,wx,wy,wz\n" + "\n".join(f"{k / 10},1,2,3" for k in range(5)))
+    with pytest.raises(BadInput, match="body"):
+        verify(str(tmp_path))
+    (found,) = verify(str(tmp_path), only="links")
+    assert any("run.csv" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(
+    ("mass", "moment"), [(1e-300, 1e-320), (1e300, 1e300), (1.0, 1e-320), (1e-300, 1.0), (1e300, 0.0), (1.0, 1e155)]
+)
+def test_numbers_beyond_the_range_are_not_tested(tmp_path, mass, moment):
+    links = arm()
+    links["left_finger"] = replace(links["left_finger"], mass=mass, inertia=moment * np.eye(3))
+    found = findings(tmp_path, links)
+    assert found["left_finger"].verdict is Verdict.NOT_TESTED
+    assert {finding.verdict for name, finding in found.items() if name != "left_finger"} == {Verdict.RIGHT}
+
+
+def test_usd_with_numbers_that_are_not_finite_is_not_tested(tmp_path, read_in_this_process):
+    pytest.importorskip("pxr")
+    for name, moments in (("nan.usda", "nan, 200, 200"), ("inf.usda", "inf, 200, 200"), ("ok.usda", "200, 200, 200")):
+        (tmp_path / name).write_text(USD.format(moments=moments, com="0, 0, 0"))
+    found = {file.subject: file.verdict for file in verify(str(tmp_path), only="links")}
+    assert found == {"inf.usda": Verdict.NOT_TESTED, "nan.usda": Verdict.NOT_TESTED, "ok.usda": Verdict.RIGHT}
+
+
+def test_an_error_of_arithmetic_in_one_file_does_not_stop_a_library(library, monkeypatch, read_in_this_process):
+    def fail(robot, subject):
+        raise np.linalg.LinAlgError("no convergence") if subject.startswith("bad") else ZeroDivisionError
+
+    monkeypatch.setattr(links_module, "judge", fail)
+    assert [file.verdict for file in verify(str(library), only="links")] == [Verdict.NOT_TESTED] * 2
+
+
+def test_two_links_of_one_name_are_judged_by_their_own_numbers(tmp_path):
+    for second, verdicts in ((TRIANGLE, ("right", "wrong")), (1e-3 * np.eye(3), ("right", "right"))):
+        link = '<link name="tip"><inertial><mass value="1"/><inertia ixx="{}" iyy="{}" izz="{}"/></inertial></link>'
+        pair = [link.format(*np.diag(tensor)) for tensor in (1e-3 * np.eye(3), second)]
+        found = findings(tmp_path, {}, f'<robot name="r">{"".join(pair)}</robot>')
+        assert (found["tip"].verdict, found["tip (again)"].verdict) == verdicts
+        assert found[""].verdict is Verdict.WRONG  # parsers refuse the file
+
+
+def test_bodies_without_a_name_are_told_apart(tmp_path):
+    pytest.importorskip("mujoco")
+    body = '<body{} pos="{} 0 0"><joint/><inertial pos="{} 0 0" mass="3" diaginertia="{}"/>{}</body>'
+    right, box = "0.003125 0.010625 0.0125", '<geom type="box" size="0.1 0.05 0.025"/>'
+    bodies = [
+        body.format("", 0, 0, right, '<geom type="mesh" mesh="m"/>'),
+        body.format("", 1, 0.5, right, box),
+        body.format(' name="body 0"', 2, 0, "3.125e-05 0.00010625 0.000125", box),
+        body.format(' name="body 1"', 3, 0, right, box),
+    ]
+    text = f'<mujoco><asset><mesh name="m" file="gone.stl"/></asset><worldbody>{"".join(bodies)}</worldbody></mujoco>'
+    found = list(findings(tmp_path, {}, text, "m.xml").values())
+    assert [finding.mistake for finding in found] == ["", "centre of mass outside the shapes", "decimal slip", ""]
+
+
+MASSLESS = """<mujoco><asset><mesh name="m" file="gone.stl"/></asset><worldbody><body name="arm"><joint/>{arm}
+<geom type="box" size="0.1 0.05 0.05" {geom}/><body name="camera" pos="0 0 0.05">{camera}</body></body></worldbody></mujoco>"""
+INERTIAL = '<inertial pos="0 0 0" mass="1" diaginertia="{0} {0} {0}"/>'
+
+
+@pytest.mark.parametrize(
+    ("arm_", "geom", "camera", "verdicts"),
+    [
+        ("", 'mass="0"', "", ("wrong", "right")),
+        ("", 'density="0"', "", ("wrong", "right")),
+        ("", "", "", ("right", "right")),
+        ("", 'mass="0"', '<geom type="mesh" mesh="m"/>', ("right", "not tested")),
+        ("", "", '<geom size="0.01"/><geom type="mesh" mesh="m" density="0"/>', ("right", "right")),
+        (INERTIAL.format("1e-5"), "", '<geom size="0.01" mass="0"/>', ("wrong", "right")),
+        (INERTIAL.format("1e-5"), "", '<geom type="mesh" mesh="m"/>', ("undecided", "not tested")),
+        (INERTIAL.format("0.003"), "", '<geom type="mesh" mesh="m"/>', ("right", "not tested")),
+    ],
+)  # fmt: skip
+def test_mjcf_without_a_mass(tmp_path, arm_, geom, camera, verdicts):
+    """Geometries of mass 0 have none. A mass that follows from a mesh that is not there is not known."""
+    pytest.importorskip("mujoco")
+    found = findings(tmp_path, {}, MASSLESS.format(arm=arm_, geom=geom, camera=camera), "m.xml")
+    assert tuple(finding.verdict for finding in found.values()) == verdicts
+
+
+def test_engines_load_the_files_of_a_library_that_can_be_read(library, monkeypatch, read_in_this_process):
+    (library / "bad_description" / "urdf" / "bad.urdf").write_text("no model")
+    loaded = []
+
+    def load(files, *_):
+        loaded.extend(path.name for path in files)
+        finding = Finding("good.urdf", "bodies", "engine", Verdict.RIGHT)
+        return [Verification("good.urdf", "model file", (finding,)) for _ in files]
+
+    monkeypatch.setattr(models, "installed_loaders", lambda: {"engine"})
+    monkeypatch.setattr(models, "verify_files", load)
+    bad, good = verify(str(library))
+    assert loaded == ["good.urdf"]
+    assert (bad.verdict, good.verdict) == (Verdict.NOT_TESTED, Verdict.RIGHT)
+    assert {finding.check for finding in good.findings} == {"links", "bodies"}
 
 
 def test_engines_are_refused_without_the_check_that_uses_them(library):
