@@ -123,8 +123,8 @@ OTHER_T = np.linspace(0.3, 5.9, 87)
     ("second", "verdicts"),
     [
         (of(*exact(FREE, OTHER_T), OTHER_T), ["right"] * 3),
-        (of(*exact(FREE, OTHER_T), OTHER_T + 0.3), ["right", "right", "undecided"]),
-        (of(Rotation.from_rotvec([0.3, 0.2, 0.7]).as_matrix() @ R, W), ["right", "right", "undecided"]),
+        (of(*exact(FREE, OTHER_T), OTHER_T + 0.3), ["right"] * 3),
+        (of(Rotation.from_rotvec([0.3, 0.2, 0.7]).as_matrix() @ R, W), ["right"] * 3),
         (of(None, W), ["right"] * 3),
         (of(R, None), ["right"] * 3),
         (of(R[:6], W[:6], T[:6]), ["right"] * 3),
