@@ -10,7 +10,7 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
-from functools import partial
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -54,6 +54,8 @@ CHECKS = ("motions", "order", "parity")
 """Checks of two back ends: the exact motions of each, the convergence of each in a sweep of steps, and their difference."""
 KIND = "back ends"
 """`Verification.kind` of two back ends."""
+SWEPT = 4
+"""Pieces of work of a usual sweep: the steps and a setting of both back ends."""
 LISTED = 3
 """Motions that a sentence names."""
 SLOPE = 0.5
@@ -248,14 +250,14 @@ def _parity(
     judged = list[Judged]()
     for k, side in enumerate(sides):
         with patience(side):
-            judged.append(_judge(side, motions, partial(tell, 0.4 * k)))
+            judged.append(_judge(side, motions, _advancing(tell, 0.4 * k, 0.4, len(motions))))
     names = [one.found.name for one in judged]
     together = f"{names[0]} and {names[1]}"
     rows, difference, curves = _compare(judged, motions, together)
     result = None
     if "order" in checks and (motion := choose(motions, lambda motion: all(_ran(one, motion) for one in judged))):
         with patience(*sides):
-            result = sweep(judged[0].found, judged[1].found, motion, partial(tell, 0.8))
+            result = sweep(judged[0].found, judged[1].found, motion, _advancing(tell, 0.8, 0.2, SWEPT))
         for one, convergence in zip(judged, (result.first, result.second), strict=True):
             one.findings.append(_order_finding(one.found, convergence, result.unit))
     made = [_verification(one, checks) for one in judged]
@@ -272,6 +274,15 @@ def _parity(
     if result is not None and (a.verdict, b.verdict) == (Verdict.RIGHT, Verdict.RIGHT):
         reason += _orders(names, result)
     return Verification(together, KIND, findings, reason, notes, details)
+
+
+def _advancing(tell: Tell, begin: float, width: float, pieces: int) -> Callable[[str], object]:
+    """Return the function that tells the next of so many pieces of work, or a few more, in a part of the whole work.
+
+    The part begins at one share of the whole, and has a width.
+    """
+    told = count()
+    return lambda what: tell(begin + width * min(1.0, next(told) / pieces), what)
 
 
 def _orders(names: Sequence[str], result: Sweep) -> str:
@@ -339,9 +350,9 @@ def _measure(side: Runnable, motions: Sequence[Motion], tell: Callable[[str], ob
         tell(f"{side.name}: order")
         free = [motion for motion in able if is_generic(motion)] or able
         longest = sorted(free, key=lambda motion: -motion.steps * motion.samples)[:GENERIC]
-        side = replace(side, order=measured_order(side, longest))
-        measured = "its motions do not depend on the step" if side.order is None else f"its order is {side.order}"
-        notes.append(f"{measured}, measured without the exact motion")
+        measured = measured_order(side, longest)
+        side = replace(side, order=measured.order)
+        notes.append(measured.reason or f"its order is {side.order}, measured without the exact motion")
     return side, notes
 
 
