@@ -10,7 +10,7 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
-from itertools import count
+from itertools import chain, count
 from typing import Any
 
 import numpy as np
@@ -29,6 +29,8 @@ from . import known as known_errors
 from . import protocol
 from .back_ends import AnyBackEnd, Raised, Runnable, find, is_single, same
 from .finding import Finding, Verdict, Verification, join_verdicts, uncapitalised
+from .mistakes.equations import EQUATIONS, EquationsMistake
+from .mistakes.scenes import SCENES, SceneMistake
 from .motions.motion import Motion
 from .motions.own import motion_of
 from .programs import (
@@ -47,6 +49,7 @@ from .programs import (
 )
 from .solution import States
 from .sweep import Convergence, Limit, Sweep, apart, choose, in_body_axes, measured_order, sentence, sweep
+from .trials import compose
 from .verify import Kind, Tell, require_motions
 from .which import UNITS, Difference, Side, which
 
@@ -206,8 +209,14 @@ def parity(
     if not chosen:
         raise BadInput("motions", "no motion", "names of motions, or a body")
     with known_errors.comparing(record, known, checks) as compare:
-        (result,) = compare([_parity(_find_both(a, b), chosen, checks or CHECKS, tell)])
+        (result,) = compare([_parity(_find_both(a, b), chosen, checks or CHECKS, tell, _left_out(chosen, seed))])
         return result
+
+
+def _left_out(chosen: Sequence[Motion], seed: int | None) -> list[Motion]:
+    """Return the motions of the catalogue, or of a seed, that are not run."""
+    names = {motion.name for motion in chosen}
+    return [motion for motion in motions_of(seed) if motion.name not in names]
 
 
 def _choose_motions(names: Sequence[str] | None, seed: int | None) -> list[Motion]:
@@ -245,7 +254,11 @@ def _find_both(a: AnyBackEnd, b: AnyBackEnd) -> list[Runnable | tuple[str, Unusa
 
 
 def _parity(
-    sides: Sequence[Runnable | tuple[str, UnusableProgram]], motions: Sequence[Motion], checks: Sequence[str], tell: Tell
+    sides: Sequence[Runnable | tuple[str, UnusableProgram]],
+    motions: Sequence[Motion],
+    checks: Sequence[str],
+    tell: Tell,
+    left_out: Sequence[Motion],
 ) -> Verification:
     judged = list[Judged]()
     for k, side in enumerate(sides):
@@ -269,11 +282,41 @@ def _parity(
         f"they agree with each other ({difference.size}), and both are wrong. {a.subject}: {a.reason}. {b.subject}: {b.reason}"
     )
     notes = [f"{one.found.name}: {note}" for one in judged for note in one.notes]
+    if (a.verdict, b.verdict) == (Verdict.RIGHT, Verdict.RIGHT) and (hidden := _hidden(judged, left_out)):
+        notes.append(f"the motions that were run cannot show these mistakes, other exact motions can: {'; '.join(hidden)}")
     details = Parity(made[0], made[1], difference, tuple(rows), result, curves)
     reason = which(a, b, difference, check=check)
     if result is not None and (a.verdict, b.verdict) == (Verdict.RIGHT, Verdict.RIGHT):
         reason += _orders(names, result)
     return Verification(together, KIND, findings, reason, notes, details)
+
+
+def _hidden(judged: Sequence[Judged], left_out: Sequence[Motion]) -> list[str]:
+    """Return the sentences of the mistakes that no run of a back end shows, and that a motion that was left out may show.
+
+    Mistakes without fitted numbers in a free body and its equations are tried on each run.
+    """
+    hidden = list[str]()
+    for mistake in chain[SceneMistake | EquationsMistake](SCENES, EQUATIONS):
+        change = mistake.change if isinstance(mistake, SceneMistake) else mistake.build
+        if mistake.numbers or not any(
+            change(motion.scene) is not None
+            for motion in left_out
+            if all(one.found.unsupported(motion.scene) is None for one in judged)
+        ):
+            continue
+        if not all(any(_shows(mistake, run) for run in one.ran.values()) for one in judged):
+            hidden.append(uncapitalised(mistake.sentence))
+    return hidden
+
+
+def _shows(mistake: SceneMistake | EquationsMistake, run: Ran) -> bool:
+    """Return whether a mistake would be seen in a run."""
+    motion = compose(mistake).build(run.case)
+    if motion is None:
+        return False
+    R, w = run.case.evaluate(motion, np.zeros((1, 6)))
+    return bool(not np.isfinite(w).all() or (run.case.apart((R[0], w[0]), run.case.exact) > run.allowed).any())
 
 
 def _advancing(tell: Tell, begin: float, width: float, pieces: int) -> Callable[[str], object]:

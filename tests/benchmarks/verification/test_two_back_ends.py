@@ -202,6 +202,21 @@ def test_an_order_below_single_precision_is_not_measured():
     assert "less than" in measured.reason
 
 
+def test_right_ones_on_motions_that_cannot_show_a_mistake_have_a_note():
+    """brick_flip has no products of inertia, so that a function without them is right there."""
+
+    def diagonal(R0, w0, inertia, dt, n):
+        return midpoint(R0, w0, np.diag(np.diag(inertia)), dt, n)
+
+    found = parity(midpoint, diagonal, motions=SMALL, only=["motions", "parity"])
+    assert verdicts(found) == ("right", "right")
+    assert any("the products of inertia are dropped" in note for note in found.notes)
+    assert not any("the gyroscopic term is missing" in note for note in found.notes)
+    found = parity(midpoint, BackEnd(midpoint, "again", rates="body", order=2), motions=[*SMALL, "products"], only="motions")
+    assert verdicts(found) == ("right", "right")
+    assert not any("the products of inertia are dropped" in note for note in found.notes)
+
+
 def test_progress_advances_with_the_motions():
     """Each motion of each back end is a piece."""
     shares = []
