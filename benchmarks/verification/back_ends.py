@@ -290,7 +290,8 @@ def _array(value: Any, name: str) -> Array:
 def _expected(part: Array, shape: tuple[int, ...], what: str) -> str:
     if what == "R" and part.shape == (shape[0], 4):
         return (
-            "matrices: scipy.spatial.transform.Rotation.from_quat(q, scalar_first=True).as_matrix() makes them of quaternions"
+            "matrices: scipy.spatial.transform.Rotation.from_quat(q, scalar_first=True).as_matrix() makes them of quaternions "
+            "w, x, y, z, and from_quat(q).as_matrix() of x, y, z, w"
         )
     if part.shape[1:] == shape[1:]:
         return f"{shape[0]} of them: the start, and the state after each of the n steps"

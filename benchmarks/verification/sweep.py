@@ -193,22 +193,40 @@ def own_order(steps: Sequence[float], made: Array, floor: float) -> float:
     return slopes[-1] if slopes else math.nan
 
 
-def measured_order(found: Runnable, motions: Sequence[Motion]) -> int | None:
-    """Return the order of a back end by its own convergence, 1 to 4; None if its motions do not depend on the step.
+@dataclass(frozen=True)
+class Measured:
+    """An order that was measured without the exact motion, 1 to 4; None if no order was found, for the `reason`.
+
+    The reason is a sentence about the back end without a subject, "" with an order.
+    """
+
+    order: int | None
+    reason: str = ""
+
+
+def measured_order(found: Runnable, motions: Sequence[Motion]) -> Measured:
+    """Return the order of a back end by its own convergence.
 
     If the motions do not approach each other, it is 1: the order with the largest tolerances.
     """
-    orders, depends, floor = list[float](), False, RESOLVED["f32" if found.single else "f64"]
+    orders, depends, compared, floor = list[float](), False, 0, RESOLVED["f32" if found.single else "f64"]
     for motion in motions:
         runs = [_run(found.solve, motion, found.principal, n) for n in FEWER]
         part = int(any(R is None for R, _ in runs))
         made = changes(runs, part)
+        compared += int(np.isfinite(made).sum())
         depends = depends or bool((made > floor).any())
         orders.append(own_order([motion.step / n for n in FEWER], made, floor))
     known = [order for order in orders if not math.isnan(order)]
-    if not known:
-        return 1 if depends else None
-    return int(np.clip(math.floor(float(np.median(known)) + BELOW), 1, 4))
+    if known:
+        return Measured(int(np.clip(math.floor(float(np.median(known)) + BELOW), 1, 4)))
+    if depends:
+        return Measured(1)
+    if not compared:
+        return Measured(None, "its order is not measured: no two of its runs with different steps have finite samples")
+    if found.single:
+        return Measured(None, f"its order is not measured: its motions change with the step by less than {floor:g} rad")
+    return Measured(None, "its motions do not depend on the step, measured without the exact motion")
 
 
 def sweep(first: Runnable, second: Runnable, motion: Motion, tell: Callable[[str], object] = lambda what: None) -> Sweep:

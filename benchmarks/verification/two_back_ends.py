@@ -10,7 +10,7 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
-from functools import partial
+from itertools import chain, count
 from typing import Any
 
 import numpy as np
@@ -29,6 +29,8 @@ from . import known as known_errors
 from . import protocol
 from .back_ends import AnyBackEnd, Raised, Runnable, find, is_single, same
 from .finding import Finding, Verdict, Verification, join_verdicts, uncapitalised
+from .mistakes.equations import EQUATIONS, EquationsMistake
+from .mistakes.scenes import SCENES, SceneMistake
 from .motions.motion import Motion
 from .motions.own import motion_of
 from .programs import (
@@ -47,6 +49,7 @@ from .programs import (
 )
 from .solution import States
 from .sweep import Convergence, Limit, Sweep, apart, choose, in_body_axes, measured_order, sentence, sweep
+from .trials import compose
 from .verify import Kind, Tell, require_motions
 from .which import UNITS, Difference, Side, which
 
@@ -54,6 +57,8 @@ CHECKS = ("motions", "order", "parity")
 """Checks of two back ends: the exact motions of each, the convergence of each in a sweep of steps, and their difference."""
 KIND = "back ends"
 """`Verification.kind` of two back ends."""
+SWEPT = 4
+"""Pieces of work of a usual sweep: the steps and a setting of both back ends."""
 LISTED = 3
 """Motions that a sentence names."""
 SLOPE = 0.5
@@ -204,8 +209,14 @@ def parity(
     if not chosen:
         raise BadInput("motions", "no motion", "names of motions, or a body")
     with known_errors.comparing(record, known, checks) as compare:
-        (result,) = compare([_parity(_find_both(a, b), chosen, checks or CHECKS, tell)])
+        (result,) = compare([_parity(_find_both(a, b), chosen, checks or CHECKS, tell, _left_out(chosen, seed))])
         return result
+
+
+def _left_out(chosen: Sequence[Motion], seed: int | None) -> list[Motion]:
+    """Return the motions of the catalogue, or of a seed, that are not run."""
+    names = {motion.name for motion in chosen}
+    return [motion for motion in motions_of(seed) if motion.name not in names]
 
 
 def _choose_motions(names: Sequence[str] | None, seed: int | None) -> list[Motion]:
@@ -243,19 +254,23 @@ def _find_both(a: AnyBackEnd, b: AnyBackEnd) -> list[Runnable | tuple[str, Unusa
 
 
 def _parity(
-    sides: Sequence[Runnable | tuple[str, UnusableProgram]], motions: Sequence[Motion], checks: Sequence[str], tell: Tell
+    sides: Sequence[Runnable | tuple[str, UnusableProgram]],
+    motions: Sequence[Motion],
+    checks: Sequence[str],
+    tell: Tell,
+    left_out: Sequence[Motion],
 ) -> Verification:
     judged = list[Judged]()
     for k, side in enumerate(sides):
         with patience(side):
-            judged.append(_judge(side, motions, partial(tell, 0.4 * k)))
+            judged.append(_judge(side, motions, _advancing(tell, 0.4 * k, 0.4, len(motions))))
     names = [one.found.name for one in judged]
     together = f"{names[0]} and {names[1]}"
     rows, difference, curves = _compare(judged, motions, together)
     result = None
     if "order" in checks and (motion := choose(motions, lambda motion: all(_ran(one, motion) for one in judged))):
         with patience(*sides):
-            result = sweep(judged[0].found, judged[1].found, motion, partial(tell, 0.8))
+            result = sweep(judged[0].found, judged[1].found, motion, _advancing(tell, 0.8, 0.2, SWEPT))
         for one, convergence in zip(judged, (result.first, result.second), strict=True):
             one.findings.append(_order_finding(one.found, convergence, result.unit))
     made = [_verification(one, checks) for one in judged]
@@ -267,11 +282,50 @@ def _parity(
         f"they agree with each other ({difference.size}), and both are wrong. {a.subject}: {a.reason}. {b.subject}: {b.reason}"
     )
     notes = [f"{one.found.name}: {note}" for one in judged for note in one.notes]
+    if (a.verdict, b.verdict) == (Verdict.RIGHT, Verdict.RIGHT) and (hidden := _hidden(judged, left_out)):
+        notes.append(f"the motions that were run cannot show these mistakes, other exact motions can: {'; '.join(hidden)}")
     details = Parity(made[0], made[1], difference, tuple(rows), result, curves)
     reason = which(a, b, difference, check=check)
     if result is not None and (a.verdict, b.verdict) == (Verdict.RIGHT, Verdict.RIGHT):
         reason += _orders(names, result)
     return Verification(together, KIND, findings, reason, notes, details)
+
+
+def _hidden(judged: Sequence[Judged], left_out: Sequence[Motion]) -> list[str]:
+    """Return the sentences of the mistakes that no run of a back end shows, and that a motion that was left out may show.
+
+    Mistakes without fitted numbers in a free body and its equations are tried on each run.
+    """
+    hidden = list[str]()
+    for mistake in chain[SceneMistake | EquationsMistake](SCENES, EQUATIONS):
+        change = mistake.change if isinstance(mistake, SceneMistake) else mistake.build
+        if mistake.numbers or not any(
+            change(motion.scene) is not None
+            for motion in left_out
+            if all(one.found.unsupported(motion.scene) is None for one in judged)
+        ):
+            continue
+        if not all(any(_shows(mistake, run) for run in one.ran.values()) for one in judged):
+            hidden.append(uncapitalised(mistake.sentence))
+    return hidden
+
+
+def _shows(mistake: SceneMistake | EquationsMistake, run: Ran) -> bool:
+    """Return whether a mistake would be seen in a run."""
+    motion = compose(mistake).build(run.case)
+    if motion is None:
+        return False
+    R, w = run.case.evaluate(motion, np.zeros((1, 6)))
+    return bool(not np.isfinite(w).all() or (run.case.apart((R[0], w[0]), run.case.exact) > run.allowed).any())
+
+
+def _advancing(tell: Tell, begin: float, width: float, pieces: int) -> Callable[[str], object]:
+    """Return the function that tells the next of so many pieces of work, or a few more, in a part of the whole work.
+
+    The part begins at one share of the whole, and has a width.
+    """
+    told = count()
+    return lambda what: tell(begin + width * min(1.0, next(told) / pieces), what)
 
 
 def _orders(names: Sequence[str], result: Sweep) -> str:
@@ -339,9 +393,9 @@ def _measure(side: Runnable, motions: Sequence[Motion], tell: Callable[[str], ob
         tell(f"{side.name}: order")
         free = [motion for motion in able if is_generic(motion)] or able
         longest = sorted(free, key=lambda motion: -motion.steps * motion.samples)[:GENERIC]
-        side = replace(side, order=measured_order(side, longest))
-        measured = "its motions do not depend on the step" if side.order is None else f"its order is {side.order}"
-        notes.append(f"{measured}, measured without the exact motion")
+        measured = measured_order(side, longest)
+        side = replace(side, order=measured.order)
+        notes.append(measured.reason or f"its order is {side.order}, measured without the exact motion")
     return side, notes
 
 

@@ -173,7 +173,7 @@ READINGS = (
     ),
     Reading(
         "size of the rates",
-        "The attitudes are right, but the rates are {factor:.5g} times too large",
+        "The attitudes are right, but the rates are {factor:.5g} times the right ones",
         _rates(lambda w, factor: w / factor),
         _rates(lambda w, factor: w * factor),
         RATES,

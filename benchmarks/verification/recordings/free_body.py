@@ -25,6 +25,7 @@ from ..explain import FEWEST, motion_with_inertia, stretched
 from ..mistakes.scenes import body_of
 from ..solution import States
 from .comparison import Rows, compare, prepare
+from .kinematics import find_contradiction
 from .table import Recording
 
 ROWS = 400
@@ -42,9 +43,6 @@ DETERMINED = 0.01
 """Largest relative standard deviation of an inertia that a recording determines."""
 FLATTEST = 1e-5, 0.02
 """Smallest moments with which a fit begins, relative to the largest one: noise can make estimates negative."""
-TURN, MOSTLY = 0.5, 0.6
-"""Turn, rad, over which attitudes and rates are compared without a body, and the share by which they contradict each other. It
-is much larger than noise, and nearly about one axis."""
 POOR = 1e-4
 """Smallest moment of an estimate, relative to their sum, that a fit trusts: smaller ones were negative."""
 NULL = 1e-6
@@ -80,6 +78,8 @@ class FreeBody:
         Changes (5, 6) of the numbers of `stretched`, and their standard deviations (5,) for the noise of the rows.
     determined
         Whether the rows determine the inertia up to a factor.
+    left
+        The largest error of attitudes, rad, beside the motion of this body; nan without attitudes, or if it was not fitted.
     """
 
     recording: Recording
@@ -88,6 +88,7 @@ class FreeBody:
     directions: Array
     sizes: Array
     determined: bool = False
+    left: float = math.nan
 
     @property
     def ratios(self) -> str:
@@ -134,25 +135,12 @@ def _fit(recording: Recording, error: float | None, guesses: Sequence[Array]) ->
     few = len(recording.t) < FEWEST_ROWS
     # An estimate that no body has is far from the best one, so that a fit can miss it.
     poor = left <= _most_left(recording) and np.linalg.eigvalsh(estimates[0])[0] < POOR * np.trace(estimates[0])
-    open_ = few or (not _contradicts(recording) and (poor or not close or best.freedom is Freedom.OPEN))
+    contradiction = find_contradiction(recording, explain=False)
+    contradicts = contradiction is not None and contradiction.large
+    open_ = few or (not contradicts and (poor or not close or best.freedom is Freedom.OPEN))
     if best.freedom is not Freedom.FREE:
         best = replace(best, freedom=Freedom.OPEN if open_ else Freedom.NOT_FREE)
     return best
-
-
-def _contradicts(recording: Recording) -> bool:
-    """Return whether attitudes turn otherwise than by the rates, by most of half a radian."""
-    t, (R, w) = recording.t[:ROWS], (_some(x) for x in recording.data)
-    if R is None or w is None or len(t) < FEWEST_ROWS:
-        return False
-    turns = (w[1:] + w[:-1]) / 2 * np.diff(t)[:, None]
-    gap = float(np.median(np.linalg.norm(turns, axis=1)))
-    if not TURN / len(turns) < gap < TURN / 2:
-        return False
-    k = math.ceil(TURN / gap)
-    sums = np.cumsum(np.vstack([np.zeros(3), turns]), axis=0)
-    expected, turned = sums[k:] - sums[:-k], Rotation.from_matrix(np.swapaxes(R[:-k], 1, 2) @ R[k:]).as_rotvec()
-    return bool(np.median(np.linalg.norm(turned - expected, axis=1)) > MOSTLY * TURN)
 
 
 def _most_left(recording: Recording) -> float:
@@ -193,7 +181,8 @@ def _refine(rows: Rows, recording: Recording, error: float | None) -> FreeBody:
     moments, determined = scene.body.moments, bool(_intervals(replace(case, scene=scene), LEAST_VISIBLE)[1].max() < DETERMINED)
     if determined and 2 * moments.max() > (1 + 1e-6 + SIGMAS * float(sizes.max())) * moments.sum():
         freedom = Freedom.NOT_FREE  # no body has these moments
-    return FreeBody(recording, freedom, scene, directions, sizes, determined and freedom is Freedom.FREE)
+    left = math.nan if recording.data[0] is None else float(compared.errors[0].max())
+    return FreeBody(recording, freedom, scene, directions, sizes, determined and freedom is Freedom.FREE, left)
 
 
 def _intervals(case: Compared, least: float) -> tuple[Array, Array]:

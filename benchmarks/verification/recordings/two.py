@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -23,10 +23,16 @@ from .verdict import UNITS, verify_recording
 GRID, NEAREST, SHIFTS, SMALL_SHIFT = 0.1, 8, 8, 1e-6
 """Distance of the shifts of time that are tried, rad, the number of the best that are improved, the steps of each, and the
 shift for slopes, rad."""
-RELATED = 3.0
-"""Largest errors of related motions, over the allowed ones: each has a start with an error of its own."""
+ROWS = 60
+"""Largest number of rows in which related motions are compared."""
+RELATED, BESIDE = 3.0, 1.0
+"""Largest errors of related motions, over the allowed ones: each has a start with an error of its own. Rows are `BESIDE` it."""
+AS_GOOD = 2.0
+"""Factor of errors within which the smaller shift of time is preferred: a periodic motion has several that are as good."""
+START_DECIDES = ". --start scene decides, and tests the start too: if the scene has another one, both are wrong"
 BODIES = {"another body", "other moments"}
 """Keys of mistakes of the body. If both recordings have one, `--body` names the wrong body, and the recordings may be right."""
+APART = "their times do not overlap"
 Named = tuple[str, Recording]
 """A recording and the name of its file."""
 
@@ -75,7 +81,7 @@ def verify_both(
     from_row: bool,
     error: float | None,
     tell: Callable[[str], object] = lambda _: None,
-    decides: str = ". --start scene decides",
+    decides: str = START_DECIDES,
 ) -> Verification:
     """Verify two recordings with different names, as `verify_two`.
 
@@ -98,11 +104,18 @@ def verify_both(
     both, recordings = (rows[first[0]], rows[second[0]]), (first[1], second[1])
     difference = find_difference(both, recordings, from_row)
     right = (a.verdict, b.verdict) == (Verdict.RIGHT, Verdict.RIGHT)
-    relation = find_relation(both, recordings) if right and not difference.agrees and not difference.missing else ""
+    relation = None
+    if right and from_row and both[1].case.start == 0 and (_apart(both, recordings) or not difference.agrees):
+        relation = find_relation(both, recordings)
+        difference = find_difference(both, recordings, from_row, relation)
     verdicts = {a.verdict, b.verdict}
     verdict = Verdict.WRONG if Verdict.WRONG in verdicts else Verdict.UNDECIDED
     verdict = Verdict.NOT_TESTED if difference.missing else Verdict.RIGHT if difference.agrees else verdict
-    return join(a, b, difference, verdict, _reason(a, b, difference, relation, decides), both[0].allowed.by)
+    made_of_both = join(a, b, difference, verdict, _reason(a, b, difference, decides), both[0].allowed.by)
+    if relation is None or not relation.text:
+        return made_of_both
+    note = f"{b.subject} has the motion of {a.subject} {relation.text}, and is compared with it so."
+    return replace(made_of_both, notes=[note, *made_of_both.notes])
 
 
 def join(
@@ -126,10 +139,12 @@ def join(
     return Verification(names, "recordings", [*a.findings, *b.findings, finding], reason, notes, Two(a, b, difference))
 
 
-def _reason(a: Verification, b: Verification, difference: Difference, relation: str, decides: str) -> str:
+def _reason(a: Verification, b: Verification, difference: Difference, decides: str) -> str:
     """Return which of two recordings is wrong, and by which mistake."""
-    how = f"{b.subject} has the motion of {a.subject} {relation}" if relation else "from different starts"
-    differ = f"both are motions of this body, {how}: they differ by {difference.size} at {difference.time:g} s{decides}"
+    differ = (
+        "both are motions of this body, from different starts: they differ by "
+        f"{difference.size} at {difference.time:g} s{decides}"
+    )
     check = (
         f"both have the same motion (they differ by at most {difference.size}), but not the motion of this body: check --body. "
         f"{a.subject}: {a.reason}"
@@ -167,19 +182,67 @@ def _start(scene: Scene, recording: Recording, before: list[tuple[Rows, Verifica
     return scene
 
 
-def find_difference(rows: tuple[Rows, Rows], recordings: tuple[Recording, Recording], from_row: bool) -> Difference:
-    """Return the largest difference between two recordings at common times.
+@dataclass(frozen=True, eq=False)
+class Relation:
+    """How the second of two recordings follows from the first: with another clock, in another world, or both.
+
+    Attributes
+    ----------
+    origin
+        Time of the exact motion of the first one at which the second one starts, s.
+    turn
+        Attitudes of the second one are `turn @ R` for attitudes R of the first one.
+    text
+        The end of a sentence on it; "" if clock and world are the same.
+    error, allowed
+        Largest errors (2,) that it leaves between the exact motions of both, and the allowed ones.
+    """
+
+    origin: float
+    turn: Array
+    text: str
+    error: Array
+    allowed: Array
+
+    @property
+    def ratio(self) -> float:
+        """The larger ratio of an error and the allowed one."""
+        return float((self.error / self.allowed).max())
+
+
+def _clock(rows: tuple[Rows, Rows], recordings: tuple[Recording, Recording]) -> tuple[float, float]:
+    """Return what is added to times of files to get times of the exact motion of the first one, and the second one's start."""
+    shift = float(rows[0].case.t[0] - recordings[0].t[0])
+    return shift, float(recordings[1].t[0]) + shift
+
+
+def _apart(rows: tuple[Rows, Rows], recordings: tuple[Recording, Recording]) -> bool:
+    """Return whether the times of two files do not overlap."""
+    a, b = (row.case for row in rows)
+    _, origin = _clock(rows, recordings)
+    return bool(origin > a.t[-1] or a.t[0] > origin + (b.t[-1] - b.t[0]))
+
+
+def find_difference(
+    rows: tuple[Rows, Rows], recordings: tuple[Recording, Recording], from_row: bool, relation: Relation | None = None
+) -> Difference:
+    """Return the largest difference between two recordings at common times, after a `relation` between them.
 
     Without common times, the second one is interpolated: not its rows, which change quickly, but their departures from an
-    exact motion. An error of this interpolation is allowed.
+    exact motion. An error of this interpolation is allowed. If their clocks do not overlap and no relation is known, the first
+    rows are compared with each other. If related recordings do not overlap, their exact motions are compared.
     """
     a, b = (row.case for row in rows)
-    shift = float(a.t[0] - recordings[0].t[0])  # from times of the file to times of the exact motion
-    times = recordings[1].t[0] + shift + (b.t - b.t[0])
+    shift, origin = _clock(rows, recordings)
+    times = (relation.origin if relation else origin) + (b.t - b.t[0])
     if times[0] > a.t[-1] or a.t[0] > times[-1]:
+        if relation:  # such as two parts of one recording
+            errors, limits = relation.error.tolist(), relation.allowed.tolist()
+            return Difference((errors[0], errors[1]), (limits[0], limits[1]), float(a.t[-1]) - shift, min(ROWS, len(b.t)))
         if not from_row or b.start != 0:
-            return Difference(missing="their times do not overlap")
-        times = a.t[0] + (b.t - b.t[0])  # two clocks: each file starts with the same motion
+            return Difference(missing=APART)
+        times = a.t[0] + (b.t - b.t[0])  # two clocks
+    data = b.data if relation is None or b.data[0] is None else (relation.turn.T @ b.data[0], b.data[1])
     have = [x is not None and y is not None for x, y in zip(a.data, b.data, strict=True)]
     if not any(have):
         return Difference(missing="one has attitudes, the other one rates")
@@ -192,7 +255,7 @@ def find_difference(rows: tuple[Rows, Rows], recordings: tuple[Recording, Record
     picked, off = common if direct else inside, np.zeros(2)
     if not len(picked):
         return Difference(missing="no row of one is between rows of the other one")
-    ours, theirs = _depart(a, a.t, a.data)[picked], _depart(a, times, b.data)
+    ours, theirs = _depart(a, a.t, a.data)[picked], _depart(a, times, data)
     if direct:
         theirs = theirs[nearest[picked]]
     else:
@@ -203,7 +266,7 @@ def find_difference(rows: tuple[Rows, Rows], recordings: tuple[Recording, Record
         theirs = np.stack([np.interp(a.t[picked], times, column) for column in theirs.T], axis=1)
     turned = (Rotation.from_rotvec(ours[:, :3]).inv() * Rotation.from_rotvec(theirs[:, :3])).magnitude()
     errors = np.stack([turned, np.linalg.norm(ours[:, 3:] - theirs[:, 3:], axis=1)])
-    allowed = rows[0].allowed.errors + rows[1].allowed.errors * [1, b.scale / a.scale] + off
+    allowed = _allowed(rows) * (RELATED + BESIDE if relation else 1) + off
     largest = np.where(have, errors.max(axis=1), np.nan)
     at = int(np.argmax(errors[int(np.nanargmax(largest / allowed))]))
     return Difference(
@@ -221,46 +284,82 @@ def _depart(reference: Compared, t: Array, data: States) -> Array:
     return differ(R, w, R if data[0] is None else data[0], w if data[1] is None else data[1], reference.scale)
 
 
-def find_relation(rows: tuple[Rows, Rows], recordings: tuple[Recording, Recording]) -> str:
-    """Return how the second of two free rotations of one body follows from the first, as the end of a sentence; "" if not.
+def _allowed(rows: tuple[Rows, Rows]) -> Array:
+    """Return the allowed differences (2,) between two recordings."""
+    return rows[0].allowed.errors + rows[1].allowed.errors * [1, rows[1].case.scale / rows[0].case.scale]
 
-    It has another origin of its clock, or its world has other axes, or both. Two rotations from different starts that are not
-    related so are different motions.
+
+def find_relation(rows: tuple[Rows, Rows], recordings: tuple[Recording, Recording]) -> Relation | None:
+    """Return how the second of two motions of one body follows from the first; None if they are different motions.
+
+    The same clock is tried first, then equal first rows, then other shifts of time, each in the same world and, for a free
+    rotation, in another one. Motions in fields are not compared with other shifts, and not in other worlds.
     """
     a, b = (row.case for row in rows)
     scene = a.scene
-    if not scene.free or scene.body.rotor_momentum is not None or not np.array_equal(scene.body.inertia, b.scene.body.inertia):
-        return ""
-    clock = float(a.t[0] - recordings[0].t[0])  # from times of the file to times of the exact motion
-    times = recordings[1].t[0] + clock + (b.t - b.t[0])
-    some = np.unique(np.linspace(0, len(times) - 1, 60).astype(int))
-    times, (R, w) = times[some], (x[some] for x in b.exact)
-    allowed = rows[0].allowed.errors + rows[1].allowed.errors * [1, b.scale / a.scale]
+    _, clock = _clock(rows, recordings)
+    some = np.unique(np.linspace(0, len(b.t) - 1, ROWS).astype(int))
+    later, (R, w) = b.t[some] - b.t[0], (x[some] for x in b.exact)
+    allowed = RELATED * _allowed(rows)
+    attitudes = a.data[0] is not None and b.data[0] is not None
 
-    def off(shift: float) -> tuple[Array, Array, Array]:
-        """Return the turn of the world, and the errors of attitudes and rates that it and a shift of time leave."""
-        R_a, w_a = truth(scene, a.start, times + shift)
-        U, _, V = np.linalg.svd((R @ np.swapaxes(R_a, 1, 2)).sum(axis=0))
-        turn = U @ np.diag([1, 1, np.linalg.det(U @ V)]) @ V
-        return turn, angle_between(turn @ R_a, R), np.linalg.norm(w_a - w, axis=1) / a.scale
+    def related(origin: float, turned: bool) -> Relation:
+        R_a, w_a = truth(scene, a.start, origin + later)
+        turn = np.eye(3)
+        if turned:
+            U, _, V = np.linalg.svd((R @ np.swapaxes(R_a, 1, 2)).sum(axis=0))
+            turn = U @ np.diag([1, 1, np.linalg.det(U @ V)]) @ V
+        off = float(angle_between(turn @ R_a, R).max()) if attitudes else 0.0
+        error = np.array([off, np.linalg.norm(w_a - w, axis=1).max() / a.scale])
+        parts = list[str]()
+        if (shift := origin - clock) and abs(shift) * a.scale > allowed.max() / RELATED:
+            parts.append(f"{abs(shift):.6g} s {'later' if shift < 0 else 'earlier'}")
+        if turned:
+            parts.append(f"in a world that is turned by ({', '.join(f'{x:.5g}' for x in _vector(turn))}) rad")
+        return Relation(origin, turn, " and ".join(parts), error, allowed)
 
-    longest = max(float(a.t[-1] - a.t[0]), float(times[-1] - times[0]))
-    grid = np.arange(-longest, longest, GRID / a.scale)
-    rates = truth(scene, a.start, times[0] + grid)[1]
-    nearest = np.argsort(np.linalg.norm(rates - w[0], axis=1), kind="stable")[:NEAREST]
-    have = [x is not None and y is not None for x, y in zip(a.data, b.data, strict=True)]
-    for start in [0.0, *grid[np.sort(nearest)].tolist()]:
-        shift = start
-        for _ in range(SHIFTS if start else 0):
-            w_a, later = (truth(scene, a.start, times + at)[1] for at in (shift, shift + SMALL_SHIFT / a.scale))
-            slope = (later - w_a) / (SMALL_SHIFT / a.scale)
-            shift += float(((w - w_a) * slope).sum() / ((slope * slope).sum() or 1.0))
-        turn, *errors = off(shift)
-        if any(error.max() > RELATED * limit for error, limit in zip(errors, allowed, strict=True)):
-            continue
-        vector = Rotation.from_matrix(turn).as_rotvec()
-        parts = [f"{abs(shift):.6g} s {'later' if shift < 0 else 'earlier'}"] * bool(abs(shift) * a.scale > allowed.max())
-        if have[0] and np.linalg.norm(vector) > allowed[0]:
-            parts.append(f"in a world that is turned by ({', '.join(f'{x:.5g}' for x in vector)}) rad")
-        return " and ".join(parts)
-    return ""
+    def best(origins: list[float], turned: bool) -> Relation | None:
+        made = [made for origin in origins if (made := related(origin, turned)).ratio <= 1]
+        least = min((made.ratio for made in made), default=0.0)
+        good = [made for made in made if made.ratio <= AS_GOOD * least]
+        return min(good, key=lambda made: abs(made.origin - clock), default=None)
+
+    if not scene.free or scene.body.rotor_momentum is not None:
+        return best([float(a.t[0])], False)
+    aligned = [clock, float(a.t[0])]
+    others = _nearby(a, (R, w), later, aligned, attitudes)
+    for turned in (False, True)[: 1 + attitudes]:
+        for origins in ([clock], [float(a.t[0])], others):
+            if found := best(origins, turned):
+                return found
+    return None
+
+
+def _vector(turn: Array) -> Array:
+    return Rotation.from_matrix(turn).as_rotvec()
+
+
+def _nearby(a: Compared, motion: tuple[Array, Array], later: Array, aligned: list[float], attitudes: bool) -> list[float]:
+    """Return times of a free rotation at which the rates are those of a `motion` (R, w) at times `later` than its first row.
+
+    They are near the times at which the first row has equal rates, or equal rates and attitudes. All shifts by which both
+    could overlap are tried, from both `aligned` times of the first row on.
+    """
+    (R, w), rate = motion, a.scale
+    longest = max(float(a.t[-1] - a.t[0]), float(later[-1]))
+    grid = np.unique(np.concatenate([origin + np.arange(-longest, longest, GRID / rate) for origin in aligned]))
+    R_a, w_a = truth(a.scene, a.start, grid)
+    off = np.linalg.norm(w_a - w[0], axis=1) / rate
+    begin = {0}
+    for size in (off, np.hypot(off, angle_between(R_a, np.broadcast_to(R[0], R_a.shape)))) if attitudes else (off,):
+        padded = np.concatenate([[np.inf], size, [np.inf]])
+        lowest = np.flatnonzero((size <= padded[:-2]) & (size <= padded[2:]))
+        begin |= set(lowest[np.argsort(size[lowest], kind="stable")[:NEAREST]].tolist())
+    found = list[float]()
+    for origin in grid[sorted(begin)].tolist():
+        for _ in range(SHIFTS):
+            w_a, moved = (truth(a.scene, a.start, origin + later + by)[1] for by in (0.0, SMALL_SHIFT / rate))
+            slope = (moved - w_a) / (SMALL_SHIFT / rate)
+            origin += float(((w - w_a) * slope).sum() / ((slope * slope).sum() or 1.0))
+        found.append(origin)
+    return found

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+
+from conservative.number_text import number
 
 from ..compare import LONGEST, UNITS_OF_DIGITS
 from ..explain import FEWEST
@@ -13,6 +16,7 @@ from ..finding import Finding, Verdict, Verification, uncapitalised
 from ..which import Difference
 from .comparison import prepare
 from .free_body import FreeBody, Freedom, fit_free_body
+from .kinematics import CLEARLY, TURN, Contradiction, find_contradiction
 from .table import Recording
 from .two import Named, Two, find_difference, join, name_apart, verify_both
 
@@ -28,8 +32,9 @@ def verify_two_alone(
     """Verify two recordings of one body that nobody describes, under the assumption that it rotates freely.
 
     The body of each recording is fitted to its rows (`fit_free_body`), and both are verified with it. A recording is wrong if
-    it is not a free rotation of any body, while the other one is, and determines the body. If each is a free rotation of
-    another body, both are undecided, with the mistakes that turn one into the other. The result has the details `Two`.
+    it is not a free rotation of any body, while the other one is, and determines the body, or if its attitudes do not turn by
+    its rates. If each is a free rotation of another body, both are undecided, with the mistakes that turn one into the other.
+    The result has the details `Two`.
 
     Parameters
     ----------
@@ -51,6 +56,10 @@ def verify_two_alone(
         tell(f"{name}: free rotation")
         fits.append(fit_free_body(recording, error, [fit.scene.body.inertia for fit in fits if fit.determined]))
     pair = (first[0], fits[0].recording), (second[0], fits[1].recording)
+    if not any(fit.determined for fit in fits):  # otherwise the body decides, and shows more
+        contradictions = [find_contradiction(recording) for _, recording in pair]
+        if any(found is not None and found.proven for found in contradictions):
+            return _assuming(_contradicting(pair, fits, contradictions, error))
     made = dict[int, Verification]()
     # The recording that determines its body better first: if both are right, its body explains both.
     for i in sorted((0, 1), key=lambda i: (not fits[i].determined, float(fits[i].sizes.max()))):
@@ -141,11 +150,47 @@ def _as_undecided(verification: Verification, detail: str) -> Verification:
     return replace(verification, findings=findings)
 
 
+def _contradicting(
+    pair: Pair, fits: list[FreeBody], contradictions: Sequence[Contradiction | None], error: float | None
+) -> Verification:
+    """Return that a recording is wrong because it contradicts itself, with the mistakes that explain it."""
+    parts, repaired = list[Verification](), list[Recording | None]()
+    for (name, recording), found in zip(pair, contradictions, strict=True):
+        repaired.append(recording if found is None else found.repaired)
+        if found is None or not found.proven:
+            why = "it does not contradict itself, and without --body it is not tested further"
+            parts.append(Verification(name, "recording", [Finding(name, "recording", "", Verdict.UNDECIDED, detail=why)], why))
+            continue
+        finding = Finding(name, "recording", "", Verdict.WRONG, found.size, CLEARLY * TURN, by="rates", causes=found.causes)
+        causes = " or ".join(f"{uncapitalised(cause.sentence)} (leaves {number(cause.left)} rad)" for cause in found.causes)
+        why = (
+            f"{causes or 'no known mistake explains it'}; its attitudes and rates contradict each other, for any body and "
+            f"field: over {TURN} rad they differ by {number(found.size)} rad"
+        )
+        parts.append(Verification(name, "recording", [finding], why))
+    difference = _difference(pair, fits, (pair[0][1], pair[1][1]), error)
+    reasons = [
+        f"{part.subject} is {part.verdict}: {part.reason}"
+        for part in sorted(parts, key=lambda part: part.verdict is not Verdict.WRONG)
+    ]
+    if (first := repaired[0]) is not None and (second := repaired[1]) is not None:
+        without = _difference(pair, fits, (first, second), error)
+        if without.agrees:
+            reasons.append(f"Without the mistake they agree: they differ by at most {without.size}")
+    verdict = Verdict.NOT_TESTED if difference.missing else Verdict.RIGHT if difference.agrees else Verdict.WRONG
+    return join(parts[0], parts[1], difference, verdict, ". ".join(reasons))
+
+
+def _difference(pair: Pair, fits: list[FreeBody], recordings: tuple[Recording, Recording], error: float | None) -> Difference:
+    """Return the difference between two recordings of a body that is not known, as departures from a free rotation."""
+    rows = [prepare(fits[0].scene, recording, True, error) for recording in recordings]
+    return find_difference((rows[0], rows[1]), recordings, True)
+
+
 def _undecided(pair: Pair, fits: list[FreeBody], error: float | None) -> Verification:
     """Return that two recordings are undecided, because neither determines a body, and the difference between them."""
     names = [name for name, _ in pair]
-    rows = tuple(prepare(fits[0].scene, recording, True, error) for _, recording in pair)
-    difference: Difference = find_difference((rows[0], rows[1]), (pair[0][1], pair[1][1]), True)
+    difference = _difference(pair, fits, (pair[0][1], pair[1][1]), error)
     free = [name for name, fit in zip(names, fits, strict=True) if fit.freedom is Freedom.FREE]
     open_ = [name for name, fit in zip(names, fits, strict=True) if fit.freedom is Freedom.OPEN]
     if free:
@@ -156,11 +201,15 @@ def _undecided(pair: Pair, fits: list[FreeBody], error: float | None) -> Verific
     elif open_:
         why = f"the rows of {' and '.join(open_)} are too few or too far apart to determine a body"
     else:
-        why = "neither recording is a free rotation of any body: both are wrong, or a field, a torque or damping acts"
+        left = [f"{number(fit.left)} rad of {name}" for name, fit in zip(names, fits, strict=True) if math.isfinite(fit.left)]
+        size = f" (the best free rotation leaves {' and '.join(left)})" * bool(left)
+        why = (
+            "neither recording is a free rotation of any body as exactly as its digits: a field, a torque or damping acts, or "
+            f"both have errors, such as those of an integrator{size}"
+        )
     agree = "" if difference.missing else f"they {'agree' if difference.agrees else 'differ'}, and "
     parts = [
         Verification(name, "recording", [Finding(name, "recording", "", Verdict.UNDECIDED, detail=why)], why) for name in names
     ]
     verdict = Verdict.NOT_TESTED if difference.missing else Verdict.RIGHT if difference.agrees else Verdict.UNDECIDED
-    made = join(parts[0], parts[1], difference, verdict, f"{agree}{why}. --body decides", rows[0].allowed.by)
-    return made
+    return join(parts[0], parts[1], difference, verdict, f"{agree}{why}. --body decides")

@@ -2,16 +2,18 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import conservative as cv
 from conservative.benchmarks.verification.explain import Diagnosis, diagnose
 from conservative.benchmarks.verification.recordings import verdict
+from conservative.benchmarks.verification.recordings.comparison import prepare
 from conservative.benchmarks.verification.recordings.table import Options, Recording, read
-from conservative.benchmarks.verification.recordings.two import verify_two
+from conservative.benchmarks.verification.recordings.two import find_relation, verify_two
 from conservative.errors import BadInput
 from conservative.reports.run.single_run import csv_text
 
-from .made import BODY, FREE, START, T, exact, late, without
+from .made import BODY, FREE, HEAVY, START, T, exact, late, without
 
 R, W = exact(FREE)
 OTHER_T = np.linspace(0.5, 5.5, 87)
@@ -103,6 +105,45 @@ def test_two_right_ones_from_different_starts_are_undecided(monkeypatch):
     found = verify(of(R, W), of(*exact(faster)))
     assert [verdict for _, verdict in findings(found)] == ["right", "right", "undecided"]
     assert verify(of(R, W), of(*exact(faster)), from_row=False).verdict == "wrong"
+
+
+TURN = np.array([0.3, 0.2, 0.7])
+PART = T[T >= 0.4]
+
+
+@pytest.mark.parametrize(
+    ("second", "later", "turn"),
+    [
+        (of(R, W, T + 3.0), 3.0, None),
+        (of(R, W, T + 100.0), 100.0, None),
+        (of(*exact(FREE, PART), PART + 99.6), 99.6, None),
+        (of(*exact(FREE, PART), PART - 2.4), -2.4, None),
+        (of(*exact(FREE, OTHER_T), OTHER_T + 99.6), 99.6, None),
+        (of(Rotation.from_rotvec(TURN).as_matrix() @ R, W), 0.0, TURN),
+        (of(Rotation.from_rotvec(TURN).as_matrix() @ R, W, T + 50.0), 50.0, TURN),
+        (of(*exact(FREE, T + 7.0), T + 7.0), 0.0, None),  # the next part of the same motion
+        (of(None, W, T + 3.0), 3.0, None),
+    ],
+)
+def test_another_clock_or_world_is_no_difference(second, later, turn):
+    recordings = of(R, W), second
+    found = verify(*recordings)
+    assert [verdict for _, verdict in findings(found)] == ["right"] * 3, found.sentence
+    rows = tuple(prepare(FREE, recording, True, None) for recording in recordings)
+    relation = find_relation(rows, recordings)
+    assert later == pytest.approx(float(second.t[0]) - relation.origin, abs=1e-9)  # measured: up to 2e-12
+    np.testing.assert_allclose(
+        Rotation.from_matrix(relation.turn).as_rotvec(), np.zeros(3) if turn is None else turn, atol=1e-9
+    )  # measured: up to 3e-13
+    assert bool(relation.text) == (later != 0 or turn is not None)
+    assert (relation.text in " ".join(found.notes)) or not relation.text
+    assert found.details.difference.error[found.details.difference.worse] < 1e-9  # measured: up to 5e-11
+
+
+def test_another_clock_in_a_field_and_if_the_start_is_tested():
+    heavy = exact(HEAVY)
+    assert verify(of(*heavy), of(*heavy, T + 3.0), HEAVY).verdict == "right"
+    assert verify(of(R, W), of(R, W, T + 3.0), from_row=False).verdict == "wrong"
 
 
 def test_our_own_samples_beside_a_file(tmp_path):

@@ -7,9 +7,11 @@ from scipy.spatial.transform import Rotation
 import conservative as cv
 from conservative.benchmarks.verification.recordings import two_alone
 from conservative.benchmarks.verification.recordings.free_body import Freedom, fit_free_body
+from conservative.benchmarks.verification.recordings.kinematics import find_contradiction
 from conservative.benchmarks.verification.recordings.table import Recording
 from conservative.benchmarks.verification.recordings.two_alone import verify_two_alone
 from conservative.errors import BadInput
+from conservative.number_text import number
 from conservative.reports.run.single_run import csv_text
 
 from ...sampling import sampled
@@ -123,8 +125,8 @@ OTHER_T = np.linspace(0.3, 5.9, 87)
     ("second", "verdicts"),
     [
         (of(*exact(FREE, OTHER_T), OTHER_T), ["right"] * 3),
-        (of(*exact(FREE, OTHER_T), OTHER_T + 0.3), ["right", "right", "undecided"]),
-        (of(Rotation.from_rotvec([0.3, 0.2, 0.7]).as_matrix() @ R, W), ["right", "right", "undecided"]),
+        (of(*exact(FREE, OTHER_T), OTHER_T + 0.3), ["right"] * 3),
+        (of(Rotation.from_rotvec([0.3, 0.2, 0.7]).as_matrix() @ R, W), ["right"] * 3),
         (of(None, W), ["right"] * 3),
         (of(R, None), ["right"] * 3),
         (of(R[:6], W[:6], T[:6]), ["right"] * 3),
@@ -176,3 +178,66 @@ def test_bad_input_without_a_body(tmp_path):
         with pytest.raises(BadInput) as refused:
             cv.verification.verify(subjects, **options)
         assert refused.value.argument == argument
+
+
+def spin(*changes, t=T):
+    """A steady spin, whose body is not determined, after changes of its rates."""
+    R, w = exact(SPIN, t)
+    for change in changes:
+        w = change(R, w)
+    return of(R, w, t)
+
+
+TOP_IN_FIELD = exact(HEAVY)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "key", "agree"),
+    [
+        (spin(), spin(in_world), "world rates", True),
+        (spin(), spin(lambda R, w: 0.5 * w), "size of the rates", True),
+        (of(*TOP_IN_FIELD), of(TOP_IN_FIELD[0], in_world(*TOP_IN_FIELD)), "world rates", True),
+        (of(*TOP_IN_FIELD), of(np.swapaxes(TOP_IN_FIELD[0], 1, 2), TOP_IN_FIELD[1]), "transposed", True),
+        (of(*TOP_IN_FIELD), of(TOP_IN_FIELD[0], TOP_IN_FIELD[1][:, [1, 2, 0]]), "rates in turned axes", False),
+        (of(*without(FREE)), of(R, in_world(R, W)), "world rates", False),
+    ],
+)
+def test_a_recording_that_contradicts_itself_is_wrong_with_any_body(first, second, key, agree):
+    for order in (1, -1):
+        found = verify_two_alone(*[("a", first), ("b", second)][::order])
+        finding = {finding.subject: finding for finding in found.findings}
+        assert found.verdict == "wrong"
+        assert (finding["a"].verdict, finding["b"].verdict) == ("undecided", "wrong")
+        assert finding["b"].mistake == key
+        assert finding["b"].causes[0].left < 1e-4  # measured: up to 4e-6, by the interpolation between rows
+        assert ("Without the mistake they agree" in found.reason) == agree
+
+
+@pytest.mark.parametrize("scene", [FREE, HEAVY, SPIN])
+@pytest.mark.parametrize("method", ["explicit Euler", "RK4", "Heun's method"])
+def test_errors_of_integrators_and_noise_are_no_contradiction(scene, method):
+    assert find_contradiction(of(*stepped(scene, method, 1))) is None
+    assert find_contradiction(of(*noisy(FREE, 0.01))) is None
+
+
+def test_a_contradiction_by_another_unit():
+    found = find_contradiction(spin(lambda R, w: w * 180 / np.pi))
+    assert [cause.key for cause in found.causes] == ["rates in degrees"]
+
+
+def test_a_contradiction_without_a_known_mistake_has_no_name():
+    found = find_contradiction(of(R, np.roll(W, 40, axis=0)))
+    assert (found.proven, found.causes) == (True, ())
+    found = verify_two_alone(("a", spin()), ("b", of(R, np.roll(W, 40, axis=0))))
+    assert [finding.verdict for finding in found.findings[:2]] == ["undecided", "wrong"]
+
+
+def test_the_error_of_an_integrator_does_not_make_both_wrong():
+    steps = of(*stepped(SPIN, "RK4", 1)), of(*stepped(SPIN, "Heun's method", 1))
+    found = verify_two_alone(("a", steps[0]), ("b", steps[1]))
+    assert [finding.verdict for finding in found.findings[:2]] == ["undecided"] * 2
+    fit = fit_free_body(steps[0])
+    assert fit.freedom is Freedom.NOT_FREE
+    assert 1e-9 < fit.left < 1e-6
+    assert f"{number(fit.left)} rad of a" in found.reason
+    assert "both are wrong" not in found.reason

@@ -6,6 +6,7 @@ import json
 import runpy
 import shlex
 import sys
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -160,10 +161,69 @@ def test_order_and_precision_are_measured():
     rk4 = right_programs.right_programs()["RK4, quaternion, rates, never normalised"]
     of_order_4 = partial(planted_pairs.simulate, rk4)
     for function, order in ((euler, 1), (midpoint, 2), (without, None), (of_order_4, 4)):
-        assert measured_order(find(function, "a"), motions) == order
+        assert measured_order(find(function, "a"), motions).order == order
     single = parity(midpoint, lambda *given: tuple(x.astype(np.float32) for x in midpoint(*given)), motions=FEW)
     assert verdicts(single) == ("right", "right")
     assert any("single precision" in note for note in single.notes)
+
+
+SMALL_MOTIONS = [motion for motion in load() if motion.name in SMALL]
+
+
+def failing_later():
+    calls = iter(range(10**6))
+
+    def fail(*given):
+        if next(calls):
+            raise RuntimeError("lost")
+        return midpoint(*given)
+
+    return fail
+
+
+def not_a_number(*given, rows=slice(None)):
+    R, w = midpoint(*given)
+    R[rows], w[rows] = np.nan, np.nan
+    return R, w
+
+
+@pytest.mark.parametrize("function", [not_a_number, partial(not_a_number, rows=slice(-3, None)), failing_later()])
+def test_an_order_of_runs_that_fail_is_not_measured(function):
+    measured = measured_order(find(function, "a"), SMALL_MOTIONS)
+    assert measured.order is None
+    assert "no two of its runs" in measured.reason
+
+
+def test_an_order_below_single_precision_is_not_measured():
+    rk4 = partial(planted_pairs.simulate, right_programs.right_programs()["RK4, quaternion, rates, never normalised"])
+    single = replace(find(lambda *given: tuple(x.astype(np.float32) for x in rk4(*given)), "a"), single=True)
+    measured = measured_order(single, SMALL_MOTIONS)
+    assert measured.order is None
+    assert "less than" in measured.reason
+
+
+def test_right_ones_on_motions_that_cannot_show_a_mistake_have_a_note():
+    """brick_flip has no products of inertia, so that a function without them is right there."""
+
+    def diagonal(R0, w0, inertia, dt, n):
+        return midpoint(R0, w0, np.diag(np.diag(inertia)), dt, n)
+
+    found = parity(midpoint, diagonal, motions=SMALL, only=["motions", "parity"])
+    assert verdicts(found) == ("right", "right")
+    assert any("the products of inertia are dropped" in note for note in found.notes)
+    assert not any("the gyroscopic term is missing" in note for note in found.notes)
+    found = parity(midpoint, BackEnd(midpoint, "again", rates="body", order=2), motions=[*SMALL, "products"], only="motions")
+    assert verdicts(found) == ("right", "right")
+    assert not any("the products of inertia are dropped" in note for note in found.notes)
+
+
+def test_progress_advances_with_the_motions():
+    """Each motion of each back end is a piece."""
+    shares = []
+    parity(midpoint, euler, motions=["brick_flip", "golden_0"], tell=lambda share, what: shares.append(share))
+    assert shares == sorted(shares)
+    assert len({share for share in shares if share < 0.4}) >= 2
+    assert shares[-1] <= 1
 
 
 def test_the_sweep_says_who_converges_to_what():
