@@ -624,6 +624,11 @@ def test_the_default_of_sdf_is_a_placeholder(tmp_path, static, inertial, kind, v
     assert (found.verdict, found.mistake) == (verdict, "placeholder inertia" if verdict == "wrong" else "")
 
 
+def test_the_default_of_sdf_is_a_placeholder_although_the_shapes_allow_it(tmp_path):
+    text = MOVING.format(static="", inertial="", kind="revolute").replace("0.2 0.2 0.2", "2.4 2.4 2.4")  # 0.96 kg m^2
+    assert findings(tmp_path, {}, text, "m.sdf")["tip"].mistake == "placeholder inertia"
+
+
 def test_links_of_models_within_a_model_of_sdf(tmp_path):
     """They have joints and twins in other models, and poses of all models that they are in."""
     arm_ = '<model name="{}_arm"><pose>0 {} 0 0 0 0</pose><link name="l">{}{}</link></model>'
