@@ -24,5 +24,6 @@ def test_the_rows_are_medians_and_the_largest_error(monkeypatch):
     found = {0: 1.0, 1: 5.0, 2: 2.0}
     monkeypatch.setattr(price, "measure", lambda side, field, index: dict.fromkeys(price.QUANTITIES, found[index]))
     rows = [(row["name"], row["quantity"], row["value"]) for row in price.price_rows((0, 1, 2), ("gravity",))]
-    values = [("one run", 2.0), ("first run of another body", 2.0), ("largest error", 5.0)]
+    medians = ("one run", "first run of another body", "next run of the same body")
+    values = [*((quantity, 2.0) for quantity in medians), ("largest error", 5.0)]
     assert rows == [(side, *value) for side in ("conservative", "heyoka") for value in values]
