@@ -54,12 +54,13 @@ def mistakes() -> str:
 def brick() -> str:
     """Return a sentence on the engines whose errors on the paper's brick are stored."""
     rows = read_csv(BRICK)
-    lost = sum(float(row["error, rad"] or 0) > LOST for row in rows)
+    installed = [float(row["error, rad"]) for row in rows if row["error, rad"]]
+    lost = sum(error > LOST for error in installed)
     what = "the largest attitude error, the largest relative energy drift and the observed order"
     return (
         f"[brick.csv](engines/brick.csv) has {what}\n"
-        f"of {len(rows)} engines, as installed and with their best settings. "
-        f"As installed, {lost} of them lose the attitude (more than 1 rad).\n"
+        f"of {len(rows)} engines with their best settings, and of {len(installed)} as installed. "
+        f"As installed, {lost} of these {len(installed)} lose the attitude (more than 1 rad).\n"
     )
 
 

@@ -71,7 +71,7 @@ EACH = ("the scene's steps, all stored", "without the conversion of an engine's 
 """The kinds of runs of `each_step`, in the order of `EachStep.runs`."""
 PICTURED = ("reduced", GENERAL, "lame", "heyoka:frame=lean", "mujoco", "pinocchio", "scipy:loop=compiled")
 LOOPS = ", compiled loops"
-"""End of the names of rows about random bodies in which nothing is delivered: times of compiled loops alone."""
+"""End of the names of rows about random bodies with the times of compiled loops alone."""
 Row = dict[str, Any]
 """A row of measured.csv: a dictionary with some of the keys `COLUMNS`."""
 
