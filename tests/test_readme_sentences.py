@@ -294,7 +294,7 @@ CLAIMS = {
     ],
     r"\* Motions that our closed forms solve": fastest_on("brick_flip", [6, 24, 96]),
     r"On the steady top \(": fastest_on("lagrange_top", [0.63, 2, 8]),
-    r"On the nutating top \(": fastest_on("nutating_top", [2, 8]),
+    r"On the nutating top \(": fastest_on("nutating_top", [2]),
     r"\* Many initial states of one body": many,
     "At the steps of .* `x` conserves": lambda rows: [
         conserved(rows),
@@ -318,7 +318,6 @@ CLAIMS = {
     r"\* heyoka is [\d.]+ \(.*\) times as fast as `x` on the nutating top": lambda rows: [
         *rows.slower("nutating_top", "closed form"),
         2,
-        8,
     ],
     r"\* heyoka takes .* of the time of our general integrators": slower_place,
     r"\* A single call for a new body": lambda rows: [1e-6, *price(("heyoka", FIRST, 1e3))(rows), 1e-9],

@@ -52,7 +52,7 @@ MOVING = {
 SEED = 1005
 """Seed of the random bodies, fixed before the run and never used before."""
 METHODS = "--methods taylor,projected,moser_veselov,lame,heyoka,scipy,mujoco,pinocchio"
-LONGER = "brick_flip:t_end=24,brick_flip:t_end=96,lagrange_top:t_end=2,lagrange_top:t_end=8,nutating_top:t_end=8"
+LONGER = "brick_flip:t_end=24,brick_flip:t_end=96,lagrange_top:t_end=2,lagrange_top:t_end=8"
 COMMANDS = {
     "accuracy": f"conservative study paper --scenes {','.join(CLOSED_FORMS)}"
     " --methods reduced,taylor,moser_veselov,lame,heyoka,scipy,mujoco,pinocchio",
