@@ -87,7 +87,7 @@ class Trajectory:
             elif name == "scene" and "_scene" in own:
                 own["scene"] = own["_scene"]()
             else:
-                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}", name=name, obj=self)
+                return object.__getattribute__(self, name)  # raises the error of an attribute that is missing or gone
             return own[name]
 
         def __getstate__(self) -> dict[str, Any]:

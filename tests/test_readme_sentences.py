@@ -277,7 +277,7 @@ CLAIMS = {
     r"\* heyoka is [\d.]+ times as fast as our general": faster_place,
     r"\* heyoka is cheaper for a single run": once,
     # both
-    "Measured on": lambda rows: [float(rows.date[:4])],
+    "Measured on": lambda rows: [float(day[:4]) for day in rows.date.split(" to ")],
     "Nielsen, ": cited,
     # entrants
     r"\* `x` is the integrator of Krenk and Nielsen": lambda rows: [cv.Reduced().order],
