@@ -47,7 +47,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Return what needs kernels, which recordings do without."""
+    """Import `BackEnd` and `parity` when they are used: they need compiled kernels, and recordings do not."""
     if name == "BackEnd":
         from .back_ends import BackEnd
 

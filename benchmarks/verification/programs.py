@@ -403,7 +403,7 @@ def motion_findings(subject: str, answers: Answers) -> tuple[list[Finding], list
 
 
 def judge_motions(subject: str, answers: Answers) -> tuple[list[Finding], list[Named], list[str], float]:
-    """Return what `motion_findings` returns, and sentences on what only long steps show, before the order."""
+    """Return the result of `motion_findings`; before the order, it has sentences on mistakes that only long steps show."""
     findings, named, order = motion_findings(subject, answers)
     limited = turn_finding(subject, answers)
     if limited is None:

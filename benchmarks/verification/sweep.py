@@ -41,7 +41,7 @@ FEWER, BELOW = PARTS[:5], 0.3
 
 
 class Limit(StrEnum):
-    """What a back end converges to as its steps become shorter."""
+    """The limit of a back end as its steps become shorter."""
 
     EXACT = "the exact motion"
     OTHER = "another motion"
@@ -300,7 +300,7 @@ def sentence(name: str, convergence: Convergence, unit: str) -> str:
 
 
 def sentences(first: str, second: str, result: Sweep) -> list[str]:
-    """Return what a sweep shows: how each back end converges, whether both approach each other, and where they agree."""
+    """Return sentences on how each back end converges, whether both approach each other, and where they agree."""
     out = [sentence(first, result.first, result.unit), sentence(second, result.second, result.unit)]
     limits, steps = (result.first.limit, result.second.limit), result.steps
     if limits == (Limit.OTHER, Limit.OTHER) and steps.between[-1] < 0.1 * min(result.first.error, result.second.error):

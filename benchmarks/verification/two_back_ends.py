@@ -286,6 +286,9 @@ def _parity(
         notes.append(f"the motions that were run cannot show these mistakes, other exact motions can: {'; '.join(hidden)}")
     details = Parity(made[0], made[1], difference, tuple(rows), result, curves)
     reason = which(a, b, difference, check=check)
+    if not {"motions", "order"} & set(checks) and all(one.answers is not None for one in judged):
+        apart = difference.missing or f"they differ by at most {difference.size}"
+        reason = f"{apart}; neither is compared with the exact motion, because parity is the only check"
     if result is not None and (a.verdict, b.verdict) == (Verdict.RIGHT, Verdict.RIGHT):
         reason += _orders(names, result)
     return Verification(together, KIND, findings, reason, notes, details)

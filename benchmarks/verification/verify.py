@@ -105,7 +105,7 @@ _WHOLE = {b"robot": b"<link", b"sdf": b"<link", b"mujoco": b"<body"}
 
 
 class Role(StrEnum):
-    """What a file of XML is in a library."""
+    """The role of an XML file in a library of models."""
 
     MODEL = "model"
     PART = "a part of a model or a template"
@@ -113,7 +113,7 @@ class Role(StrEnum):
 
 
 def role_of(path: Path) -> Role:
-    """Return what a file of XML is. One that is named as a model and is not XML is a model, which then cannot be read."""
+    """Return the role of an XML file. A file with the name of a model that is not XML counts as a model that cannot be read."""
     try:
         text = re.sub(rb"<!--.*?-->", b"", path.read_bytes(), flags=re.DOTALL)
     except OSError:

@@ -103,7 +103,9 @@ def which(
             return f"{agree}both are wrong by the same mistake: {a.sentence}{numbers}"
         if a.mistake and b.mistake:
             return f"both are wrong by different mistakes. {a.subject}: {a.reason}. {b.subject}: {b.reason}"
-    return ". ".join(f"{side.subject} is {side.verdict}: {side.reason}" for side in sorted((a, b), key=_order))
+    return ". ".join(
+        f"{side.subject} is {side.verdict}" + f": {side.reason}" * bool(side.reason) for side in sorted((a, b), key=_order)
+    )
 
 
 def _order(side: Side) -> bool:

@@ -19,7 +19,7 @@ LANGUAGES = ("c", "csharp", "javascript", "python", "rust")
     short_help="Write exact motions as files, for the tests of an engine.",
     epilog=epilog(
         "conservative motions --out motions                                     the published motions",
-        "conservative motions --seed 7 --out fresh                              motions that nobody has seen",
+        "conservative motions --seed 7 --out fresh                              new exact motions",
         "conservative motions --seed 7 --language rust --out rotation_test.rs   a test with some of them",
     ),
 )

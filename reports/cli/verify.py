@@ -67,11 +67,11 @@ LISTS = ("only", "pairs", "engines")
     epilog=epilog(
         "conservative verify run.csv --body my_body.toml                 is this recorded motion right?",
         "conservative verify a.csv b.csv --body my_body.toml             they disagree: which one is wrong?",
-        "conservative verify a.csv b.csv                                 the same, if nobody knows the body: it rotates freely",
+        "conservative verify a.csv b.csv                                 the same without the body, if it rotates freely",
         "conservative verify ./my_engine 'python my_engine.py'           programs",
         "conservative verify mujoco@3.12.0 drake:discrete                engines",
         "conservative verify mujoco:RK4 pinocchio --pairs                two back ends differ: which one is wrong?",
-        "conservative verify ./my_engine --seed 7                        by motions that nobody has seen",
+        "conservative verify ./my_engine --seed 7                        by new exact motions",
         "conservative verify ./my_engine --record known.txt              its errors are known, later ones fail:",
         "conservative verify ./my_engine --known known.txt",
         "conservative verify my_robot.urdf --engines mujoco,drake        do they load the body that the file describes?",

@@ -211,7 +211,7 @@ class Relation:
 
 
 def _clock(rows: tuple[Rows, Rows], recordings: tuple[Recording, Recording]) -> tuple[float, float]:
-    """Return what is added to times of files to get times of the exact motion of the first one, and the second one's start."""
+    """Return the offset from times of files to times of the first one's exact motion, and the start of the second one."""
     shift = float(rows[0].case.t[0] - recordings[0].t[0])
     return shift, float(recordings[1].t[0]) + shift
 

@@ -1,4 +1,4 @@
-"""Two recordings of a body that nobody describes: which one is wrong, and by which mistake, if the body rotates freely?"""
+"""Two recordings without a description of their body: find the wrong one and its mistake, if the body rotates freely."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Pair = tuple[Named, Named]
 def verify_two_alone(
     first: Named, second: Named, error: float | None = None, tell: Callable[[str], object] = lambda _: None
 ) -> Verification:
-    """Verify two recordings of one body that nobody describes, under the assumption that it rotates freely.
+    """Verify two recordings of one body without its description, under the assumption that it rotates freely.
 
     The body of each recording is fitted to its rows (`fit_free_body`), and both are verified with it. A recording is wrong if
     it is not a free rotation of any body, while the other one is, and determines the body, or if its attitudes do not turn by

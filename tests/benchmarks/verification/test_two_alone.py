@@ -1,4 +1,4 @@
-"""Two recordings of a body that nobody describes: the fit of a free rotation, and which of two is wrong."""
+"""Two recordings without a description of their body: the fit of a free rotation, and which of two is wrong."""
 
 import numpy as np
 import pytest

@@ -568,3 +568,10 @@ def test_the_sweep_of_the_page_is_measured():
     assert steps.agree(1e-6) is None
     picture = (ROOT / "reports" / "pictures" / "two_back_ends.svg").read_text(encoding="utf-8")
     assert all(row["quantity"] in picture for row in found.details.rows())
+
+
+def test_parity_alone_says_that_nothing_is_compared_with_the_exact_motion():
+    found = cv.verification.parity("reduced", "taylor", motions=["golden_0"], only="parity")
+    assert "neither is compared with the exact motion" in found.sentence
+    assert "not tested" not in found.sentence
+    assert {finding.check for finding in found.findings} == {"parity"}
